@@ -1,0 +1,235 @@
+"""The values that the stages take and give: frozen, with read-only arrays.
+
+Coordinates are float64 (x right, y up, in pixels): pixel (row, column) of a picture with `n_rows` rows covers
+``[column, column + 1] x [n_rows - row - 1, n_rows - row]``. Ids are int64, labels int32, -1 stands for none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+VOID = -1  #: label of a pixel, or region beside a chain, that is not meshed
+
+
+class PointKind(IntEnum):
+    """What a point may do when nodes move."""
+
+    FREE = 0  #: inside a chain: slides along it
+    JUNCTION = 1  #: where three or more chains meet: stays
+    FRAME = 2  #: on the picture's border, inside a chain: slides along the border
+    CORNER = 3  #: a corner of the picture or a sharp corner of a chain: stays
+    INTERIOR = 4  #: of a mesh only, on no chain: moves freely
+
+
+def _frozen(values: ArrayLike, dtype: Any, ndim: int) -> NDArray[Any]:
+    array = np.array(values, dtype=dtype, order="C", ndmin=ndim)
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Materials:
+    """What the picture called its materials.
+
+    Parameters
+    ----------
+    labels : array_like of int32, shape (n,)
+        The number of each material, ascending.
+    names : tuple of str
+        Name of each material, in the order of `labels`.
+    colors : array_like of uint8, shape (n, 3)
+        RGB of each material, in the order of `labels`.
+    """
+
+    labels: NDArray[np.int32]
+    names: tuple[str, ...]
+    colors: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "labels", _frozen(self.labels, np.int32, 1))
+        object.__setattr__(self, "names", tuple(self.names))
+        object.__setattr__(self, "colors", _frozen(np.reshape(self.colors, (-1, 3)), np.uint8, 2))
+
+    def name_of(self, label: int) -> str:
+        """Name of material number `label`."""
+        at = int(np.searchsorted(self.labels, label))
+        return self.names[at] if at < len(self.labels) and self.labels[at] == label else f"material {label}"
+
+
+@dataclass(frozen=True, eq=False)
+class LabelImage:
+    """A picture in which every pixel has one material.
+
+    Parameters
+    ----------
+    labels : array_like of int32, shape (n_rows, n_cols)
+        Material of each pixel, row 0 on top; `VOID` where there is none.
+    materials : Materials
+        Number, name and colour of each material that occurs (and perhaps of more).
+    """
+
+    labels: NDArray[np.int32]
+    materials: Materials
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "labels", _frozen(self.labels, np.int32, 2))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_rows, n_cols)."""
+        return self.labels.shape[0], self.labels.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryGraph:
+    """Boundaries between all colours: chains of points from junction to junction.
+
+    Parameters
+    ----------
+    points : float64, shape (n_points, 2)
+        x right, y up, in pixels.
+    point_kind : uint8, shape (n_points,)
+        A `PointKind` each (never INTERIOR).
+    chain_offsets : int64, shape (n_chains + 1,)
+        Chain c has the points ``chain_points[chain_offsets[c]:chain_offsets[c + 1]]``.
+    chain_points : int64
+        Ids of points; a closed chain repeats its first point at its end.
+    chain_regions : int64, shape (n_chains, 2)
+        Region on the left and on the right of each chain, seen along it; `VOID` for none.
+    region_label : int32, shape (n_regions,)
+        Material of each region (connected, of one colour).
+    region_pixels : int64, shape (n_regions,)
+        Pixels of each region in the picture: the area that smoothing keeps.
+    shape : tuple of int
+        (n_rows, n_cols) of the picture.
+
+    Notes
+    -----
+    `extract_boundaries` gives the pixel boundary. `smooth_boundaries` gives the boundary that is meshed: then
+    every chain has an EVEN number of segments as long as the final edges, and the points at even places of a chain
+    (the coarse nodes) form a planar graph by themselves, as do all points.
+    """
+
+    points: NDArray[np.float64]
+    point_kind: NDArray[np.uint8]
+    chain_offsets: NDArray[np.int64]
+    chain_points: NDArray[np.int64]
+    chain_regions: NDArray[np.int64]
+    region_label: NDArray[np.int32]
+    region_pixels: NDArray[np.int64]
+    shape: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        for name, dtype, ndim in (
+            ("points", np.float64, 2),
+            ("point_kind", np.uint8, 1),
+            ("chain_offsets", np.int64, 1),
+            ("chain_points", np.int64, 1),
+            ("chain_regions", np.int64, 2),
+            ("region_label", np.int32, 1),
+            ("region_pixels", np.int64, 1),
+        ):
+            object.__setattr__(self, name, _frozen(getattr(self, name), dtype, ndim))
+
+    @property
+    def n_chains(self) -> int:
+        """Number of chains."""
+        return len(self.chain_offsets) - 1
+
+    def chain(self, c: int) -> NDArray[np.int64]:
+        """Ids of the points of chain `c`, in order."""
+        return self.chain_points[self.chain_offsets[c] : self.chain_offsets[c + 1]]
+
+    @cached_property
+    def segments(self) -> NDArray[np.int64]:
+        """All segments of all chains as point ids, shape (n_segments, 2), chain by chain."""
+        return chain_segments(self.chain_offsets, self.chain_points)
+
+
+@dataclass(frozen=True, eq=False)
+class QuadMesh:
+    """An all-quadrilateral mesh of several materials.
+
+    Parameters
+    ----------
+    points : float64, shape (n_points, 2)
+        x right, y up, in pixels (or in the user's unit after `scaled`).
+    point_kind : uint8, shape (n_points,)
+        A `PointKind` each.
+    quads : int64, shape (n_quads, 4)
+        Ids of the corners of each quad, counter-clockwise.
+    quad_region : int64, shape (n_quads,)
+        Region of each quad.
+    region_label : int32, shape (n_regions,)
+        Material of each region.
+    chain_offsets, chain_points, chain_regions
+        The chains of the boundaries, as in `BoundaryGraph`, in ids of this mesh's points.
+    materials : Materials
+        Number, name and colour of the materials.
+    """
+
+    points: NDArray[np.float64]
+    point_kind: NDArray[np.uint8]
+    quads: NDArray[np.int64]
+    quad_region: NDArray[np.int64]
+    region_label: NDArray[np.int32]
+    chain_offsets: NDArray[np.int64]
+    chain_points: NDArray[np.int64]
+    chain_regions: NDArray[np.int64]
+    materials: Materials
+
+    def __post_init__(self) -> None:
+        for name, dtype, ndim in (
+            ("points", np.float64, 2),
+            ("point_kind", np.uint8, 1),
+            ("quads", np.int64, 2),
+            ("quad_region", np.int64, 1),
+            ("region_label", np.int32, 1),
+            ("chain_offsets", np.int64, 1),
+            ("chain_points", np.int64, 1),
+            ("chain_regions", np.int64, 2),
+        ):
+            object.__setattr__(self, name, _frozen(getattr(self, name), dtype, ndim))
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    @property
+    def n_quads(self) -> int:
+        """Number of quads."""
+        return len(self.quads)
+
+    @cached_property
+    def quad_material(self) -> NDArray[np.int32]:
+        """Material of each quad, int32, shape (n_quads,)."""
+        return self.region_label[self.quad_region]
+
+    @cached_property
+    def constraints(self) -> NDArray[np.int64]:
+        """Edges that lie on a chain, shape (n, 2), chain by chain."""
+        return chain_segments(self.chain_offsets, self.chain_points)
+
+    @cached_property
+    def valence(self) -> NDArray[np.int64]:
+        """Number of quads at each point."""
+        return np.bincount(self.quads.ravel(), minlength=self.n_points)
+
+    def scaled(self, factor: float) -> QuadMesh:
+        """Return the same mesh with all coordinates times `factor`."""
+        return replace(self, points=self.points * factor)
+
+
+def chain_segments(offsets: NDArray[np.int64], points: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return consecutive pairs of points within each chain, shape (n, 2)."""
+    pairs = np.stack([points[:-1], points[1:]], axis=1)
+    inside = np.ones(max(len(points) - 1, 0), bool)
+    inside[offsets[1:-1] - 1] = False
+    return pairs[inside]
