@@ -229,7 +229,7 @@ class QuadMesh:
 
 def chain_segments(offsets: NDArray[np.int64], points: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return consecutive pairs of points within each chain, shape (n, 2)."""
-    pairs = np.stack([points[:-1], points[1:]], axis=1)
+    pairs: NDArray[np.int64] = np.stack([points[:-1], points[1:]], axis=1)
     inside = np.ones(max(len(points) - 1, 0), bool)
     inside[offsets[1:-1] - 1] = False
-    return pairs[inside]
+    return np.ascontiguousarray(pairs[inside])
