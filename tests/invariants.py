@@ -1,0 +1,144 @@
+"""What every mesh must satisfy, told from its arrays alone."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from imgquad_core.model import VOID, LabelImage, PointKind, QuadMesh
+from numpy.typing import NDArray
+from scipy.ndimage import label as connected
+from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+Array = NDArray[Any]
+
+
+def assert_valid_mesh(mesh: QuadMesh, image: LabelImage, *, pixel_size: float = 1.0) -> None:
+    """Fail unless `mesh` is a valid all-quad mesh of `image`: convex, conforming, whole, of the right materials."""
+    rows, cols = image.shape
+    points = np.asarray(mesh.points) / pixel_size
+    assert_arrays(mesh)
+    assert_convex(points, mesh.quads)
+    assert_conforming(mesh)
+    assert_constraints(mesh, points, (cols, rows))
+    assert_topology(mesh, image)
+    assert_materials(mesh, points, image)
+
+
+def assert_arrays(mesh: QuadMesh) -> None:
+    assert mesh.quads.ndim == 2
+    assert mesh.quads.shape[1] == 4
+    assert mesh.n_quads > 0
+    assert np.isfinite(mesh.points).all()
+    assert np.array_equal(np.unique(mesh.quads), np.arange(mesh.n_points)), "points that no quad uses, or bad ids"
+    assert len(np.unique(mesh.points, axis=0)) == mesh.n_points or VOID in mesh.chain_regions, "coincident points"
+    assert len(mesh.quad_region) == mesh.n_quads
+    assert mesh.quad_region.min() >= 0
+    assert mesh.quad_region.max() < len(mesh.region_label)
+    for name in ("points", "quads", "quad_region", "region_label", "chain_points"):
+        assert not getattr(mesh, name).flags.writeable
+
+
+def assert_convex(points: Array, quads: Array) -> None:
+    """All four corners turn left: counter-clockwise, convex, of positive area, no repeated node."""
+    p = points[quads]
+    ahead, back = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
+    turn = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]
+    bad = np.flatnonzero((turn <= 0).any(axis=1))
+    assert not len(bad), f"{len(bad)} quads not convex, first at {p[bad[0]].mean(axis=0)}"
+
+
+def assert_conforming(mesh: QuadMesh) -> None:
+    """Every half-edge runs once, and at most one runs the other way."""
+    start, end = _half_edges(mesh.quads)
+    keys = start * mesh.n_points + end
+    assert len(np.unique(keys)) == len(keys), "an edge has more than two quads, or two that lie on one side of it"
+
+
+def assert_constraints(mesh: QuadMesh, points: Array, extent: tuple[float, float]) -> None:
+    """The chains are just the edges of the rim and between regions, each with its regions left and right."""
+    start, end = _half_edges(mesh.quads)
+    region = dict(zip(zip(start.tolist(), end.tolist(), strict=True), np.repeat(mesh.quad_region, 4), strict=True))
+    chain_edges = []
+    for c, (left, right) in enumerate(mesh.chain_regions.tolist()):
+        ids = mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]].tolist()
+        for a, b in pairwise(ids):
+            assert region.get((a, b), VOID) == left, f"left of chain {c} at {points[a]}"
+            assert region.get((b, a), VOID) == right, f"right of chain {c} at {points[a]}"
+            chain_edges.append((min(a, b), max(a, b)))
+    assert len(set(chain_edges)) == len(chain_edges), "two chains run along one edge"
+    borders = {(min(e), max(e)) for e, r in region.items() if region.get(e[::-1], VOID) != r}
+    assert borders == set(chain_edges)
+
+    on_chain = np.zeros(mesh.n_points, bool)
+    on_chain[mesh.chain_points] = True
+    assert np.array_equal(on_chain, mesh.point_kind != PointKind.INTERIOR)
+    frame = points[mesh.point_kind == PointKind.FRAME]
+    assert (np.isclose(frame, 0) | np.isclose(frame, extent)).any(axis=1).all(), "FRAME point off the border"
+    assert points.min() >= 0
+    assert (points <= extent).all()
+
+
+def assert_topology(mesh: QuadMesh, image: LabelImage) -> None:
+    """The quads form a planar surface with as many parts and holes as it has rims: Euler, counted fan by fan."""
+    start, end = _half_edges(mesh.quads)
+    n = len(start)
+    order = {(a, b): h for h, (a, b) in enumerate(zip(start.tolist(), end.tolist(), strict=True))}
+    twin = np.array([order.get((b, a), -1) for a, b in zip(start.tolist(), end.tolist(), strict=True)])
+    inner = np.flatnonzero(twin >= 0)
+    n_fans, fan = _parts(n, inner, twin[inner] // 4 * 4 + (twin[inner] + 1) % 4)  # corners around a node
+    n_parts, _ = _parts(mesh.n_quads, inner // 4, twin[inner] // 4)
+    rim = np.flatnonzero(twin < 0)
+    rim_fans, ends = np.unique(np.stack([fan[rim], fan[rim // 4 * 4 + (rim + 1) % 4]]), return_inverse=True)
+    n_rims, _ = _parts(len(rim_fans), *ends.reshape(2, -1))
+    n_edges = len(inner) // 2 + len(rim)
+    assert n_fans - n_edges + mesh.n_quads == 2 * n_parts - n_rims
+
+    solid = image.labels != VOID
+    assert connected(solid, np.ones((3, 3)))[1] <= n_parts <= connected(solid)[1]
+    if solid.all():
+        assert n_fans == mesh.n_points
+        assert (n_parts, n_rims) == (1, 1)
+
+
+def assert_materials(mesh: QuadMesh, points: Array, image: LabelImage) -> None:
+    """Every material of the picture, no other, where the picture has it; the area is that of the pixels."""
+    solid = image.labels != VOID
+    assert np.array_equal(np.unique(mesh.quad_material), np.unique(image.labels[solid]))
+    p = points[mesh.quads]
+    x, y = p[..., 0], p[..., 1]
+    area = 0.5 * ((x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0]))
+    if solid.all():
+        assert np.isclose(area.sum(), solid.size, rtol=1e-9)
+    size = {"size": 3, "mode": "nearest"}
+    away = maximum_filter(image.labels, **size) == minimum_filter(image.labels, **size)
+    found = rasterise(points, mesh.quads, mesh.quad_material, image.shape)
+    agree = (found == image.labels)[away]
+    assert agree.all() if agree.size < 1000 else agree.mean() >= 0.999, (
+        f"{np.sum(~agree)} of {agree.size} pixels differ"
+    )
+
+
+def rasterise(points: Array, quads: Array, values: Array, shape: tuple[int, int]) -> Array:
+    """Value of the (convex, counter-clockwise) quad that holds each pixel's centre, VOID where none does."""
+    rows, cols = shape
+    out = np.full(shape, VOID, np.int64)
+    for p, value in zip(points[quads], values, strict=True):
+        x0, y0 = np.maximum(np.floor(p.min(axis=0)).astype(int), 0)
+        x1, y1 = np.minimum(np.ceil(p.max(axis=0)).astype(int), (cols, rows))
+        x, y = np.meshgrid(np.arange(x0, x1) + 0.5, np.arange(y0, y1) + 0.5)
+        e = np.roll(p, -1, axis=0) - p
+        inside = np.all([d[0] * (y - a[1]) - d[1] * (x - a[0]) >= -1e-9 for a, d in zip(p, e, strict=True)], axis=0)
+        out[rows - 1 - np.floor(y[inside]).astype(int), np.floor(x[inside]).astype(int)] = value
+    return out
+
+
+def _half_edges(quads: Array) -> tuple[Array, Array]:
+    return np.asarray(quads).ravel(), np.roll(quads, -1, axis=1).ravel()
+
+
+def _parts(n: int, a: Array, b: Array) -> tuple[int, Array]:
+    return connected_components(coo_array((np.ones(len(a), bool), (a, b)), shape=(n, n)), directed=False)
