@@ -1,0 +1,68 @@
+"""Files for solvers and mesh apps: one writer a format, chosen by the extension."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from inspect import Parameter, signature
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from imgquad_core.errors import InputError
+from imgquad_core.femesh import FEMesh
+from imgquad_core.model import QuadMesh
+from imgquad_core.sets import fe_mesh
+from imgquad_core.writers.abaqus import write_abaqus
+
+Writer = Callable[..., None]
+
+#: writer of each extension; `.vtu`, `.vtk` and `.vtkhdf` are PyVista's own and live in the plugin
+WRITERS: Mapping[str, Writer] = MappingProxyType(
+    {
+        ".inp": write_abaqus,
+    }
+)
+
+
+def writer_for(path: str | Path) -> Writer:
+    """Return the writer of the extension of `path`.
+
+    Raises
+    ------
+    InputError
+        No writer here has this extension.
+    """
+    extension = Path(path).suffix.lower()
+    if extension not in WRITERS:
+        raise InputError(f"no writer for '{extension}' ({path}); there are: {' '.join(sorted(WRITERS))}")
+    return WRITERS[extension]
+
+
+def options_of(writer: Writer) -> tuple[str, ...]:
+    """Names of the options that `writer` takes besides the mesh and the path."""
+    return tuple(p.name for p in signature(writer).parameters.values() if p.kind is Parameter.KEYWORD_ONLY)
+
+
+def write_mesh(mesh: QuadMesh | FEMesh, path: str | Path, **options: Any) -> None:
+    """Write `mesh` in the format of the extension of `path`.
+
+    Parameters
+    ----------
+    mesh : QuadMesh or FEMesh
+        What to write; sets are found if it is a `QuadMesh`.
+    path : path
+        File to write; replaced only when all of it was written.
+    **options
+        Of the writer: see its docstring.
+
+    Raises
+    ------
+    InputError
+        No such format, no such option, or the format cannot hold the mesh.
+    """
+    writer = writer_for(path)
+    for name in options:
+        if name not in options_of(writer):
+            known = ", ".join(options_of(writer)) or "none"
+            raise InputError(f"{Path(path).suffix} has no option '{name}'; options: {known}")
+    writer(fe_mesh(mesh) if isinstance(mesh, QuadMesh) else mesh, path, **options)

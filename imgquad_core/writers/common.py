@@ -1,0 +1,108 @@
+"""What the writers share: files that appear whole or not at all, safe names, fast rows of numbers."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+import unicodedata
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imgquad_core.errors import InputError
+from imgquad_core.femesh import FEMesh, Names
+
+ROWS_AT_ONCE = 20_000
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Give a path in a new folder beside `path`, with the same name; move what was written there when all went well.
+
+    Raises
+    ------
+    InputError
+        Nothing can be written there, or the disk is full. What was at `path` before is still there.
+    """
+    target = Path(path)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".imgquad-", dir=target.parent) as folder:
+            yield Path(folder) / target.name
+            for part in sorted(Path(folder).iterdir()):
+                os.replace(part, target.parent / part.name)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"cannot write {target}: {reason}; nothing was changed, choose another place") from error
+
+
+def write_text(path: str | Path, parts: Iterable[str]) -> None:
+    """Write `parts` one after the other, as UTF-8, whole or not at all."""
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.writelines(parts)
+
+
+def rows(template: str, *columns: ArrayLike) -> Iterator[str]:
+    """Format row by row: `template` takes the values of each row of the columns, as ``%`` does."""
+    arrays = [np.asarray(column) for column in columns]
+    for start in range(0, len(arrays[0]), ROWS_AT_ONCE):
+        lists = [part for array in arrays for part in _as_lists(array[start : start + ROWS_AT_ONCE])]
+        yield template * len(lists[0]) % tuple(chain.from_iterable(zip(*lists, strict=True)))
+
+
+def _as_lists(array: np.ndarray[Any, Any]) -> list[list[Any]]:
+    return [array.tolist()] if array.ndim == 1 else array.T.tolist()
+
+
+def wrapped(ids: ArrayLike, per_line: int, separator: str = ", ") -> Iterator[str]:
+    """Yield numbers, `per_line` to a line."""
+    values = list(map(str, np.asarray(ids).tolist()))
+    for start in range(0, len(values), per_line):
+        yield separator.join(values[start : start + per_line]) + "\n"
+
+
+def safe_names(names: Iterable[str], limit: int, *, reserved: Sequence[str] = (), upper: bool = False) -> dict[str, str]:
+    """Return a name for each of `names` that a solver takes: letters, digits, ``_``; first a letter; no two alike.
+
+    Raises
+    ------
+    InputError
+        A name has more than `limit` signs.
+    """
+    claimed = Names(reserved)
+    safe = {name: claimed.claim(_plain(name, upper)) for name in names}
+    for name, short in safe.items():
+        if len(short) > limit:
+            raise InputError(
+                f"the set name '{short}' has {len(short)} signs, this format takes {limit}: give the materials shorter names"
+            )
+    return safe
+
+
+def _plain(name: str, upper: bool) -> str:
+    text = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    text = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_") or "set"
+    text = text if text[0].isalpha() else f"m_{text}"
+    return text.upper() if upper else text
+
+
+def points_3d(mesh: FEMesh) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Points with z = 0 in the plane."""
+    return mesh.points if mesh.points.shape[1] == 3 else np.column_stack([mesh.points, np.zeros(mesh.n_points)])
+
+
+def refuse_cohesive(mesh: FEMesh, form: str) -> None:
+    """Raise where `form` cannot hold cohesive elements."""
+    if len(mesh.cohesive):
+        raise InputError(f"{form} has no cohesive elements; write .inp, .e, .msh, .vtu or .npz, or leave the interfaces whole")
+
+
+def refuse_3d(mesh: FEMesh, form: str) -> None:
+    """Raise where `form` holds plane meshes only."""
+    if mesh.dimension == 3:
+        raise InputError(f"{form} is for plane meshes; write an extruded mesh as .inp, .e, .msh, .bdf or .vtu")

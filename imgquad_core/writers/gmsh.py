@@ -1,0 +1,157 @@
+"""Gmsh mesh files (text, 4.1 and 2.2) with named physical groups.
+
+Each group is one entity whose tag is the group's: GetFEM reads entities for groups, getdp numbers over all dimensions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from imgquad_core.errors import InputError
+from imgquad_core.femesh import FEMesh, Floats, Ints
+from imgquad_core.writers.common import points_3d, rows, safe_names, write_text
+
+NAME_LIMIT = 127
+ELEMENT_TYPES = {"point": 15, "line2": 1, "line3": 8, "quad4": 3, "quad8": 16, "quad9": 10, "hex8": 5}
+
+
+class Group(NamedTuple):
+    """A physical group: its elements have ids from `first` on."""
+
+    dimension: int
+    tag: int
+    name: str
+    element: int
+    nodes: Ints
+    first: int
+
+
+def write_gmsh(mesh: FEMesh, path: str | Path, *, version: str = "4.1") -> None:
+    """Write a Gmsh mesh (``.msh``).
+
+    Parameters
+    ----------
+    mesh : FEMesh
+        Groups are made of its materials, cohesive elements, side sets, and corners. Where two side sets are the same
+        edges (both sides of an interface that was not split), the first is written.
+    path : path
+        File to write; replaced only when all of it was written.
+    version : str
+        ``4.1``, or ``2.2`` for getdp and other old readers.
+
+    Raises
+    ------
+    InputError
+        Another version, or a name of more than 127 signs.
+    """
+    if version not in ("4.1", "2.2"):
+        raise InputError(f"Gmsh version '{version}' is not written; choose 4.1 or 2.2")
+    groups = _groups(mesh)
+    points = points_3d(mesh)
+    write_text(path, _text_41(points, groups) if version == "4.1" else _text_22(points, groups))
+
+
+def _groups(mesh: FEMesh) -> list[Group]:
+    found = [*_cell_groups(mesh), *_side_groups(mesh), *_point_groups(mesh)]
+    names = safe_names([name for _, name, _, _ in found], NAME_LIMIT)
+    groups, first = [], 1
+    for tag, (dimension, name, element, nodes) in enumerate(found, 1):
+        groups.append(Group(dimension, tag, names[name], ELEMENT_TYPES[element], nodes, first))
+        first += len(nodes)
+    return groups
+
+
+def _cell_groups(mesh: FEMesh) -> Iterator[tuple[int, str, str, Ints]]:
+    for name, ids in mesh.material_cells().items():
+        yield mesh.dimension, name, mesh.kind, mesh.cells[ids]
+    if mesh.cohesive.shape[1] == 6:
+        raise InputError("Gmsh has no six-node cohesive elements: split interfaces at order 1, or write .npz")
+    for name, ids in mesh.cohesive_cells().items():
+        yield mesh.dimension, name, "hex8" if mesh.dimension == 3 else "quad4", mesh.cohesive[ids]
+
+
+def _side_groups(mesh: FEMesh) -> Iterator[tuple[int, str, str, Ints]]:
+    seen = np.zeros((0, 2), np.int64)
+    element = {(2, 2): "line2", (2, 3): "line3", (3, 4): "quad4"}
+    for name, sides in mesh.side_sets.items():
+        nodes = mesh.side_nodes(sides)
+        corners = np.sort(nodes[:, :2] if mesh.dimension == 2 else nodes, axis=1)[:, [0, -1]]
+        if not _all_in(corners, seen):
+            seen = np.concatenate([seen, corners])
+            yield mesh.dimension - 1, name, element[mesh.dimension, nodes.shape[1]], nodes
+
+
+def _all_in(edges: Ints, seen: Ints) -> bool:
+    """Whether all of `edges` are among `seen`; both as (lowest, highest node), which tells sides apart."""
+    if not len(seen):
+        return False
+    base = int(max(edges.max(), seen.max())) + 1
+    return bool(np.isin(edges[:, 0] * base + edges[:, 1], seen[:, 0] * base + seen[:, 1]).all())
+
+
+def _point_groups(mesh: FEMesh) -> Iterator[tuple[int, str, str, Ints]]:
+    for name, ids in mesh.node_sets.items():
+        if name.startswith("corner_") and len(ids) == 1:
+            yield 0, name, "point", ids[:, None]
+
+
+def _names_text(groups: list[Group]) -> Iterator[str]:
+    yield f"$PhysicalNames\n{len(groups)}\n"
+    yield from (f'{g.dimension} {g.tag} "{g.name}"\n' for g in groups)
+    yield "$EndPhysicalNames\n"
+
+
+def _text_41(points: Floats, groups: list[Group]) -> Iterator[str]:
+    yield "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+    yield from _names_text(groups)
+    yield from _entities(points, groups)
+    blocks = _node_blocks(points, groups)
+    yield f"$Nodes\n{len(blocks)} {len(points)} 1 {len(points)}\n"
+    for group, ids in blocks:
+        yield f"{group.dimension} {group.tag} 0 {len(ids)}\n"
+        yield from rows("%d\n", ids + 1)
+        yield from rows("%.16g %.16g %.16g\n", points[ids])
+    n_elements = groups[-1].first + len(groups[-1].nodes) - 1
+    yield f"$EndNodes\n$Elements\n{len(groups)} {n_elements} 1 {n_elements}\n"
+    for g in groups:
+        yield f"{g.dimension} {g.tag} {g.element} {len(g.nodes)}\n"
+        ids = np.arange(g.first, g.first + len(g.nodes))
+        yield from rows("%d" + " %d" * g.nodes.shape[1] + "\n", ids, g.nodes + 1)
+    yield "$EndElements\n"
+
+
+def _entities(points: Floats, groups: list[Group]) -> Iterator[str]:
+    yield "$Entities\n" + " ".join(str(sum(g.dimension == d for g in groups)) for d in range(4)) + "\n"
+    for g in sorted(groups, key=lambda g: g.dimension):
+        low, high = points[g.nodes].min(axis=(0, 1)), points[g.nodes].max(axis=(0, 1))
+        box = low if g.dimension == 0 else np.concatenate([low, high])
+        yield f"{g.tag} {' '.join(f'{v:.16g}' for v in box)} 1 {g.tag}{' 0' if g.dimension else ''}\n"
+    yield "$EndEntities\n"
+
+
+def _node_blocks(points: Floats, groups: list[Group]) -> list[tuple[Group, Ints]]:
+    """Each node in the first group of the lowest dimension that has it."""
+    owner = np.full(len(points), -1)
+    ordered = sorted(groups, key=lambda g: -g.dimension)
+    for i, g in reversed(list(enumerate(ordered))):
+        nodes = g.nodes[owner[g.nodes] < 0]
+        owner[nodes] = i
+    blocks = [(g, np.flatnonzero(owner == i)) for i, g in enumerate(ordered)]
+    return [(g, ids) for g, ids in blocks if len(ids)]
+
+
+def _text_22(points: Floats, groups: list[Group]) -> Iterator[str]:
+    yield "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+    yield from _names_text(groups)
+    yield f"$Nodes\n{len(points)}\n"
+    yield from rows("%d %.16g %.16g %.16g\n", np.arange(1, len(points) + 1), points)
+    yield f"$EndNodes\n$Elements\n{sum(len(g.nodes) for g in groups)}\n"
+    for g in groups:
+        ids = np.arange(g.first, g.first + len(g.nodes))
+        head = f"%d {g.element} 2 {g.tag} {g.tag}"
+        yield from rows(head + " %d" * g.nodes.shape[1] + "\n", ids, g.nodes + 1)
+    yield "$EndElements\n"

@@ -1,0 +1,134 @@
+"""QuadMesh values made without the mesher: one quad a pixel ("staircase mesh"), nodes moved if wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from imgquad_core.model import VOID, Materials, PointKind, QuadMesh
+
+Floats = NDArray[np.float64]
+
+
+def staircase(
+    labels: ArrayLike, names: tuple[str, ...] | None = None, move: Callable[[Floats], Floats] | None = None
+) -> QuadMesh:
+    """One quad a pixel, in the order of the pixels; `move` displaces the nodes that are not on the border."""
+    image = np.asarray(labels, np.int32)
+    rows, cols = image.shape
+    grid = np.arange((rows + 1) * (cols + 1)).reshape(rows + 1, cols + 1)
+    y, x = np.divmod(np.arange(grid.size), cols + 1)
+    points = np.stack([x, rows - y], axis=1).astype(float)
+    corners = np.stack([grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:], grid[:-1, :-1]], axis=-1).reshape(-1, 4)
+    regions, region_label = _regions(image)
+    kept = image.ravel() != VOID
+    kind, chains, sides = _chains(image, regions, grid)
+    if move is not None:
+        inner = (x > 0) & (x < cols) & (y > 0) & (y < rows)
+        points[inner] += move(points[inner])
+    used, new = np.unique(corners[kept], return_inverse=True)
+    number = np.full(grid.size, -1)
+    number[used] = np.arange(len(used))
+    material = np.unique(image[image != VOID])
+    return QuadMesh(
+        points=points[used],
+        point_kind=kind[used],
+        quads=new.reshape(-1, 4),
+        quad_region=regions.ravel()[kept],
+        region_label=region_label,
+        chain_offsets=np.cumsum([0] + [len(c) for c in chains]),
+        chain_points=number[np.concatenate(chains)],
+        chain_regions=np.array(sides),
+        materials=Materials(material, names or tuple(f"m{m}" for m in material), np.zeros((len(material), 3))),
+    )
+
+
+def jiggle(points: Floats) -> Floats:
+    """Move each node by up to 0.2, always in the same way."""
+    x, y = points.T
+    return 0.2 * np.stack([np.sin(12.9 * x + 78.2 * y), np.cos(39.3 * x + 11.1 * y)], axis=1)
+
+
+def disk(n: int, radius: float) -> NDArray[np.int32]:
+    """An n x n picture: 1 inside the circle about its centre, 0 outside."""
+    at = np.arange(n) + 0.5 - n / 2
+    return (at[:, None] ** 2 + at[None, :] ** 2 < radius**2).astype(np.int32)
+
+
+def _regions(image: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Number of the 4-connected region of each pixel (VOID outside) and the label of each region."""
+    regions = np.full(image.shape, VOID, np.int64)
+    labels: list[int] = []
+    for start in zip(*np.nonzero(image != VOID), strict=True):
+        if regions[start] != VOID:
+            continue
+        stack = [start]
+        regions[start] = len(labels)
+        while stack:
+            r, c = stack.pop()
+            for p in ((r + 1, c), (r - 1, c), (r, c + 1), (r, c - 1)):
+                inside = 0 <= p[0] < image.shape[0] and 0 <= p[1] < image.shape[1]
+                if inside and image[p] == image[start] and regions[p] == VOID:
+                    regions[p] = len(labels)
+                    stack.append(p)
+        labels.append(int(image[start]))
+    return regions, np.array(labels, np.int32)
+
+
+def _chains(
+    image: NDArray[np.int32], regions: NDArray[np.int64], grid: NDArray[np.int64]
+) -> tuple[NDArray[np.uint8], list[list[int]], list[tuple[int, int]]]:
+    """Kind of each node, chains from junction to junction, region on their left and right."""
+    padded = np.pad(regions, 1, constant_values=VOID)
+    left_of: dict[tuple[int, int], int] = {}  # directed lattice edge -> region on its left
+    around: dict[int, list[int]] = {}
+    rows, cols = image.shape
+    for r in range(rows + 1):
+        for c in range(cols + 1):
+            here = int(grid[r, c])
+            if c < cols and padded[r, c + 1] != padded[r + 1, c + 1]:  # edge to the right: above | below
+                there = int(grid[r, c + 1])
+                left_of[here, there], left_of[there, here] = int(padded[r, c + 1]), int(padded[r + 1, c + 1])
+                around.setdefault(here, []).append(there)
+                around.setdefault(there, []).append(here)
+            if r < rows and padded[r + 1, c] != padded[r + 1, c + 1]:  # edge downwards: right side | left side
+                there = int(grid[r + 1, c])
+                left_of[here, there], left_of[there, here] = int(padded[r + 1, c + 1]), int(padded[r + 1, c])
+                around.setdefault(here, []).append(there)
+                around.setdefault(there, []).append(here)
+    frame = np.ones(grid.shape, bool)
+    frame[1:-1, 1:-1] = False
+    kind = np.full(grid.size, PointKind.INTERIOR, np.uint8)
+    for node in around:
+        kind[node] = PointKind.FRAME if frame.ravel()[node] else PointKind.FREE
+        if len(around[node]) > 2:
+            kind[node] = PointKind.JUNCTION
+    for node in grid[[0, 0, -1, -1], [0, -1, 0, -1]]:
+        if node in around:
+            kind[node] = PointKind.CORNER
+    return (kind, *_walk(around, left_of, kind))
+
+
+def _walk(
+    around: dict[int, list[int]], left_of: dict[tuple[int, int], int], kind: NDArray[np.uint8]
+) -> tuple[list[list[int]], list[tuple[int, int]]]:
+    chains, sides, seen = [], [], set[tuple[int, int]]()
+    starts = [n for n in around if kind[n] == PointKind.JUNCTION] + list(around)
+    for start in starts:
+        for step in around[start]:
+            if (start, step) in seen:
+                continue
+            chain = [start]
+            here = step
+            while True:
+                seen |= {(chain[-1], here), (here, chain[-1])}
+                chain.append(here)
+                if here == start or kind[here] == PointKind.JUNCTION:
+                    break
+                ways = [n for n in around[here] if n != chain[-2]]
+                here = ways[0]
+            chains.append(chain)
+            sides.append((left_of[chain[0], chain[1]], left_of[chain[1], chain[0]]))
+    return chains, sides
