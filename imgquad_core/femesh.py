@@ -136,7 +136,8 @@ class FEMesh:
     def side_nodes(self, sides: Ints) -> Ints:
         """Nodes of (element, side) pairs, shape (n, nodes of a side): ends first, then the middle."""
         table = np.array(KINDS[self.kind].sides, np.int64)
-        return self.cells[sides[:, :1], table[sides[:, 1]]]
+        nodes: Ints = self.cells[sides[:, :1], table[sides[:, 1]]]
+        return nodes
 
     def material_names(self) -> dict[int, str]:
         """Name of each material that occurs, by number, ascending; no two alike."""

@@ -80,7 +80,9 @@ def _read_toml(path: Path) -> Mapping[str, Any]:
 
 def _checked(name: str, table: Any) -> Mapping[str, float]:
     if not isinstance(table, Mapping):
-        raise InputError(f"material values: '{name} = {table!r}' stands outside a table; write it below a line [material]")
+        raise InputError(
+            f"material values: '{name} = {table!r}' stands outside a table; write it below a line [material]"
+        )
     for key, value in table.items():
         if key not in LIMITS:
             raise InputError(f"material values: [{name}] has an unknown value '{key}'; known: {', '.join(LIMITS)}")

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from imgquad_core.model import VOID, Materials, PointKind, QuadMesh
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
@@ -49,6 +48,17 @@ def jiggle(points: Floats) -> Floats:
     """Move each node by up to 0.2, always in the same way."""
     x, y = points.T
     return 0.2 * np.stack([np.sin(12.9 * x + 78.2 * y), np.cos(39.3 * x + 11.1 * y)], axis=1)
+
+
+def jiggle_beside(axis: int, *places: float) -> Callable[[Floats], Floats]:
+    """`jiggle`, but what lies at `places` along `axis` stays there: flat interfaces."""
+
+    def move(points: Floats) -> Floats:
+        shift = jiggle(points)
+        shift[np.isin(points[:, axis], places), axis] = 0
+        return shift
+
+    return move
 
 
 def disk(n: int, radius: float) -> NDArray[np.int32]:

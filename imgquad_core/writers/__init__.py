@@ -13,13 +13,32 @@ from imgquad_core.femesh import FEMesh
 from imgquad_core.model import QuadMesh
 from imgquad_core.sets import fe_mesh
 from imgquad_core.writers.abaqus import write_abaqus
+from imgquad_core.writers.archive import write_npz
+from imgquad_core.writers.converted import write_med, write_xdmf
+from imgquad_core.writers.drawings import write_dxf, write_svg
+from imgquad_core.writers.exodus import write_exodus
+from imgquad_core.writers.gmsh import write_gmsh
+from imgquad_core.writers.nastran import write_nastran
+from imgquad_core.writers.surfaces import write_obj, write_off, write_ply, write_stl
 
 Writer = Callable[..., None]
 
 #: writer of each extension; `.vtu`, `.vtk` and `.vtkhdf` are PyVista's own and live in the plugin
 WRITERS: Mapping[str, Writer] = MappingProxyType(
     {
+        ".bdf": write_nastran,
+        ".dxf": write_dxf,
+        ".e": write_exodus,
         ".inp": write_abaqus,
+        ".med": write_med,
+        ".msh": write_gmsh,
+        ".npz": write_npz,
+        ".obj": write_obj,
+        ".off": write_off,
+        ".ply": write_ply,
+        ".stl": write_stl,
+        ".svg": write_svg,
+        ".xdmf": write_xdmf,
     }
 )
 

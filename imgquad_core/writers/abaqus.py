@@ -84,7 +84,9 @@ def write_abaqus(
     chosen = analysis or ("solid" if mesh.dimension == 3 else "plane stress")
     element = element_type(mesh, chosen, reduced)
     if chosen.startswith("axisymmetric") and mesh.points[:, 0].min() < 0:
-        raise InputError(f"axisymmetric: x is the radius, but the smallest x is {mesh.points[:, 0].min():g}; move the mesh")
+        raise InputError(
+            f"axisymmetric: x is the radius, but the smallest x is {mesh.points[:, 0].min():g}; move the mesh"
+        )
     if not thickness > 0:
         raise InputError(f"thickness = {thickness!r} must be positive")
     values = read_properties(properties) if properties is not None else {}

@@ -66,7 +66,9 @@ def wrapped(ids: ArrayLike, per_line: int, separator: str = ", ") -> Iterator[st
         yield separator.join(values[start : start + per_line]) + "\n"
 
 
-def safe_names(names: Iterable[str], limit: int, *, reserved: Sequence[str] = (), upper: bool = False) -> dict[str, str]:
+def safe_names(
+    names: Iterable[str], limit: int, *, reserved: Sequence[str] = (), upper: bool = False
+) -> dict[str, str]:
     """Return a name for each of `names` that a solver takes: letters, digits, ``_``; first a letter; no two alike.
 
     Raises
@@ -76,10 +78,10 @@ def safe_names(names: Iterable[str], limit: int, *, reserved: Sequence[str] = ()
     """
     claimed = Names(reserved)
     safe = {name: claimed.claim(_plain(name, upper)) for name in names}
-    for name, short in safe.items():
+    for short in safe.values():
         if len(short) > limit:
             raise InputError(
-                f"the set name '{short}' has {len(short)} signs, this format takes {limit}: give the materials shorter names"
+                f"the set name '{short}' has {len(short)} signs, this format takes {limit}; shorten names of materials"
             )
     return safe
 
@@ -99,7 +101,9 @@ def points_3d(mesh: FEMesh) -> np.ndarray[Any, np.dtype[np.float64]]:
 def refuse_cohesive(mesh: FEMesh, form: str) -> None:
     """Raise where `form` cannot hold cohesive elements."""
     if len(mesh.cohesive):
-        raise InputError(f"{form} has no cohesive elements; write .inp, .e, .msh, .vtu or .npz, or leave the interfaces whole")
+        raise InputError(
+            f"{form} has no cohesive elements; write .inp, .e, .msh or .npz, or leave the interfaces whole"
+        )
 
 
 def refuse_3d(mesh: FEMesh, form: str) -> None:

@@ -43,7 +43,7 @@ def deck_text(
         if missing:
             raise InputError(
                 f"the deck '{deck}' needs {' and '.join(missing)} of material '{name}'; "
-                f"give them in a TOML file of properties below [{name}] or [\"*\"]"
+                f'give them in a TOML file of properties below [{name}] or ["*"]'
             )
     for border in ("left", "right"):
         if border not in mesh.node_sets:
@@ -100,7 +100,7 @@ def _hold_island(mesh: FEMesh, part: Ints) -> Iterator[tuple[int, tuple[int, ...
     """Three (six) directions for a part that hangs on no border: a point, a point beside it, a point above."""
     if mesh.dimension == 3:
         raise InputError(
-            f"{len(part)} nodes of the extruded mesh hang on neither left nor right: leave such parts out before extruding"
+            f"{len(part)} nodes of the extruded mesh hang on neither left nor right: drop such parts before extruding"
         )
     first = part[np.lexsort(mesh.points[part].T)[0]]
     beside = part[np.argmax(np.abs(mesh.points[part, 0] - mesh.points[first, 0]))]

@@ -113,7 +113,10 @@ def _property(element: str, pid: int, thickness: float, values: Mapping[str, flo
     young, poisson = values.get("young", 1.0), values.get("poisson", 0.0)
     density = f"{_real(values['density']):>16s}" if "density" in values else " " * 16
     expansion = f"{_real(values['expansion']):>16s}" if "expansion" in values else ""
-    yield f"MAT1*   {pid:16d}{_real(young):>16s}{'':16s}{_real(poisson):>16s}\n*       {density}{expansion}".rstrip() + "\n"
+    yield (
+        f"MAT1*   {pid:16d}{_real(young):>16s}{'':16s}{_real(poisson):>16s}\n*       {density}{expansion}".rstrip()
+        + "\n"
+    )
     if "conductivity" in values:
         yield f"MAT4*   {pid:16d}{_real(values['conductivity']):>16s}\n*\n"
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from handmade import disk, jiggle, staircase
-
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import KINDS, FEMesh, Names
 from imgquad_core.model import VOID
 from imgquad_core.sets import fe_mesh
+
+from handmade import disk, jiggle, staircase
 
 THREE = np.array([[0, 0, 1, 1], [0, 0, 1, 1], [2, 2, 2, 2]])
 
@@ -41,7 +41,10 @@ def test_an_interface_has_the_sides_of_both_materials_and_one_node_set() -> None
 
 def test_corners_and_junctions() -> None:
     mesh = three()
-    assert [tuple(mesh.points[mesh.node_sets[f"corner_{c}"][0]]) for c in ("bottom_left", "top_right")] == [(0, 0), (4, 3)]
+    assert [tuple(mesh.points[mesh.node_sets[f"corner_{c}"][0]]) for c in ("bottom_left", "top_right")] == [
+        (0, 0),
+        (4, 3),
+    ]
     assert {tuple(p) for p in mesh.points[mesh.node_sets["junctions"]]} == {(2, 1), (2, 3), (0, 1), (4, 1)}
 
 

@@ -1,0 +1,78 @@
+"""Formats that kept libraries write right: MED by Gmsh, XDMF by meshio. Both are extras."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from imgquad_core.errors import InputError
+from imgquad_core.femesh import FEMesh
+from imgquad_core.writers.common import points_3d, refuse_cohesive, replacing
+from imgquad_core.writers.gmsh import write_gmsh
+
+MESHIO_KINDS = {"quad4": "quad", "quad8": "quad8", "quad9": "quad9", "hex8": "hexahedron"}
+
+
+def write_med(mesh: FEMesh, path: str | Path) -> None:
+    """Write a MED file (``.med``) for Code_Aster and Salome with groups of elements, sides and corners; by Gmsh.
+
+    Raises
+    ------
+    InputError
+        The Python package gmsh is not installed.
+    """
+    gmsh = _needed("gmsh", ".med")
+    with replacing(path) as temporary:
+        source = temporary.with_suffix(".msh")
+        write_gmsh(mesh, source)
+        gmsh.initialize(interruptible=False)
+        try:
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.open(str(source))
+            gmsh.write(str(temporary))
+        finally:
+            gmsh.finalize()
+        source.unlink()
+
+
+def write_xdmf(mesh: FEMesh, path: str | Path) -> None:
+    """Write an XDMF file (``.xdmf`` and ``.h5`` beside it) for FEniCSx and ParaView; by meshio.
+
+    Elements carry their `material`; a second file ``NAME_sides.xdmf`` has the sides with the number `side_set`, in the
+    order of `FEMesh.side_sets` from 1 (an interface that was not split once).
+
+    Raises
+    ------
+    InputError
+        The Python packages meshio and h5py are not installed, or the mesh has cohesive elements.
+    """
+    meshio = _needed("meshio", ".xdmf")
+    _needed("h5py", ".xdmf")
+    refuse_cohesive(mesh, "XDMF")
+    points = points_3d(mesh) if mesh.dimension == 3 else mesh.points
+    with replacing(path) as temporary:
+        cells = [(MESHIO_KINDS[mesh.kind], mesh.cells)]
+        meshio.write(temporary, meshio.Mesh(points, cells, cell_data={"material": [mesh.cell_material]}), "xdmf")
+        sides, numbers = _tagged_sides(mesh)
+        kind = {(2, 2): "line", (2, 3): "line3", (3, 4): "quad"}[mesh.dimension, sides.shape[1]]
+        tagged = meshio.Mesh(points, [(kind, sides)], cell_data={"side_set": [numbers]})
+        meshio.write(temporary.with_name(f"{temporary.stem}_sides{temporary.suffix}"), tagged, "xdmf")
+
+
+def _tagged_sides(mesh: FEMesh) -> tuple[Any, Any]:
+    """All sides of all sets, each once, with the number of the first set that has it."""
+    nodes = np.concatenate([mesh.side_nodes(sides) for sides in mesh.side_sets.values()])
+    numbers = np.repeat(np.arange(1, len(mesh.side_sets) + 1), [len(sides) for sides in mesh.side_sets.values()])
+    _, first = np.unique(np.sort(nodes, axis=1), axis=0, return_index=True)
+    kept = np.sort(first)
+    return nodes[kept], numbers[kept].astype(np.int32)
+
+
+def _needed(package: str, extension: str) -> Any:
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise InputError(f"{extension} is written by the Python package {package}: pip install {package}") from error
