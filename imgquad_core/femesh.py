@@ -169,6 +169,14 @@ class FEMesh:
         }
 
 
+def nodes_of_sides(mesh: FEMesh) -> dict[str, Ints]:
+    """Return the node sets of `mesh`, those named like a side set made anew from its sides."""
+    return {
+        name: np.unique(mesh.side_nodes(mesh.side_sets[name])) if name in mesh.side_sets else ids
+        for name, ids in mesh.node_sets.items()
+    }
+
+
 def name_materials(labels: NDArray[np.int32], materials: Materials) -> dict[int, str]:
     """Name of each material among `labels`, by number, ascending; no two alike."""
     names = Names()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
-from imgquad_core.model import VOID, Materials, PointKind, QuadMesh
 from numpy.typing import ArrayLike, NDArray
+
+from imgquad_core.model import VOID, Materials, PointKind, QuadMesh
 
 Floats = NDArray[np.float64]
 
@@ -65,6 +67,51 @@ def disk(n: int, radius: float) -> NDArray[np.int32]:
     """An n x n picture: 1 inside the circle about its centre, 0 outside."""
     at = np.arange(n) + 0.5 - n / 2
     return (at[:, None] ** 2 + at[None, :] ** 2 < radius**2).astype(np.int32)
+
+
+def round_inclusion(n: int, radius: float, side: float, layers: int) -> QuadMesh:
+    """A disk of `radius` (4 n nodes on its circle) in the middle of a square: a block inside, rings around it.
+
+    ::
+
+        o-------o    block of n x n quads inside the disk, `layers` rings from it to the circle,
+        | (   ) |    2 x `layers` rings from the circle to the square
+        o-------o
+    """
+    steps = np.linspace(-1, 1, n + 1)
+    square = np.concatenate(
+        [
+            np.c_[steps[:-1], -np.ones(n)],
+            np.c_[np.ones(n), steps[:-1]],
+            np.c_[-steps[:-1], np.ones(n)],
+            np.c_[-np.ones(n), -steps[:-1]],
+        ]
+    )
+    angle = np.arctan2(-1, -1) + np.arange(4 * n) * np.pi / (2 * n)
+    circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    rings = [square * radius * 0.45 + (circle - square * radius * 0.45) * k / layers for k in range(1, layers + 1)]
+    rings += [circle + (square * side / 2 - circle) * k / (2 * layers) for k in range(1, 2 * layers + 1)]
+    block = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) * radius * 0.45
+    grid = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    loops = [np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])]
+    loops += [len(block) + np.arange(4 * n) + 4 * n * k for k in range(len(rings))]
+    quads = [np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)]
+    quads += [np.stack([np.roll(o, -1), np.roll(i, -1), i, o], axis=1)[:, [3, 0, 1, 2]] for i, o in pairwise(loops)]
+    region = np.repeat([1, 0], [n * n + layers * 4 * n, 2 * layers * 4 * n])
+    kind = np.full(len(block) + 4 * n * len(rings), PointKind.INTERIOR, np.uint8)
+    kind[loops[layers]], kind[loops[-1]], kind[loops[-1][::n]] = PointKind.FREE, PointKind.FRAME, PointKind.CORNER
+    closed = [np.append(loop, loop[0]) for loop in (loops[-1], loops[layers])]
+    return QuadMesh(
+        points=np.concatenate([block, *rings]) + side / 2,
+        point_kind=kind,
+        quads=np.concatenate(quads),
+        quad_region=region,
+        region_label=[0, 1],
+        chain_offsets=[0, 4 * n + 1, 8 * n + 2],
+        chain_points=np.concatenate(closed),
+        chain_regions=[[0, VOID], [1, 0]],
+        materials=Materials([0, 1], ("matrix", "disk"), np.zeros((2, 3))),
+    )
 
 
 def _regions(image: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:

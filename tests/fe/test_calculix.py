@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from imgquad_core.model import VOID
-from imgquad_core.writers import write_mesh
 
 from ccx import needs_ccx, solve
-from handmade import disk, jiggle, jiggle_beside, staircase
+from handmade import disk, jiggle, jiggle_beside, round_inclusion, staircase
+from imgquad_core.model import VOID
+from imgquad_core.second_order import second_order
+from imgquad_core.sets import fe_mesh
+from imgquad_core.writers import write_mesh
 
 pytestmark = needs_ccx
 DISK = staircase(disk(12, 4), ("matrix", "disk"), jiggle)
@@ -61,3 +63,20 @@ def test_surfaces_take_a_load(tmp_path: Path) -> None:
     (tmp_path / "a.inp").write_text(text[:step] + "*STEP\n*STATIC\n*DSLOAD\nS_RIGHT, P, -10.\n" + text[end:])
     found = solve(tmp_path / "a.inp", "*EL PRINT, ELSET=EALL\nS")["stresses"]
     assert np.abs(found[:, 2] - 10).max() < 1e-5
+
+
+@pytest.mark.parametrize(("analysis", "stress"), [("plane stress", 210.0), ("plane strain", 210 / 0.91)])
+@pytest.mark.parametrize("reduced", [False, True])
+def test_patch_test_with_eight_nodes(tmp_path: Path, analysis: str, stress: float, reduced: bool) -> None:
+    mesh = second_order(fe_mesh(round_inclusion(4, 10, 40, 3)))
+    write_mesh(mesh, tmp_path / "a.inp", analysis=analysis, reduced=reduced, properties=SAME, deck="tension")
+    found = solve(tmp_path / "a.inp", "*EL PRINT, ELSET=EALL\nS")
+    across = 0.3 * stress if analysis == "plane strain" else 0.0
+    assert np.abs(found["stresses"][:, 2:] - [stress, 0, across, 0, 0, 0]).max() < 1e-6 * stress
+
+
+def test_patch_test_in_heat_with_eight_nodes(tmp_path: Path) -> None:
+    mesh = second_order(fe_mesh(round_inclusion(4, 10, 40, 3)))
+    write_mesh(mesh, tmp_path / "a.inp", properties=SAME, deck="thermal")
+    found = solve(tmp_path / "a.inp", "*NODE PRINT, NSET=NALL\nNT")["temperatures"]
+    assert np.abs(found[:, 1] - mesh.points[found[:, 0].astype(int) - 1, 0] / 40).max() < 1e-6
