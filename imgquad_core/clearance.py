@@ -1,0 +1,212 @@
+"""The exact test that segments neither cross nor touch, and the tests that they keep room for good elements.
+
+Coordinates are multiples of 2^-14 px, as int64: orientations of points up to 2^16 px are exact, no tolerance is
+needed anywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.curves import Flags, Floats, Ints
+from imgquad_core.jit import kernel
+
+UNITS = 16384.0  #: grid steps a pixel
+FREE, SHARP, CLOSE, CROSSING = range(4)  #: what a segment is marked with
+_ROOM = 0.25  # least distance of a node from a segment that is not its own, over the length of that segment
+
+
+def snapped(points: Floats) -> Floats:
+    """Round coordinates to the grid on which the test is exact."""
+    return np.round(points * UNITS) / UNITS
+
+
+def find_conflicts(points: Floats, segments: Ints, chain: Ints, is_new: Flags, shape: tuple[int, int]) -> NDArray[np.uint8]:
+    """Find segments that cross, touch, coincide, have no length or come too close.
+
+    Parameters
+    ----------
+    points : float64, shape (n, 2)
+        Snapped points, inside the picture.
+    segments : int64, shape (m, 2)
+        Ids of the ends of each segment; segments that share an id may meet there.
+    chain : int64, shape (m,)
+        Chain of each segment.
+    is_new : bool, shape (n_chains,)
+        Only pairs of which one is on a new chain are looked at.
+    shape : tuple of int
+        (n_rows, n_cols) of the picture.
+
+    Returns
+    -------
+    uint8, shape (m,)
+        FREE, CLOSE or CROSSING.
+    """
+    marks = np.zeros(len(segments), np.uint8)
+    if len(segments):
+        lengths = np.hypot(*(points[segments[:, 1]] - points[segments[:, 0]]).T)
+        cell = max(float(lengths.mean()), float(np.sqrt(shape[0] * shape[1] / (4.0 * len(segments)))))
+        n_across, n_up = int(shape[1] / cell) + 1, int(shape[0] / cell) + 1
+        start, items = _bucket_segments(points, segments, cell, n_across, n_up)
+        grid = np.round(points * UNITS).astype(np.int64)
+        _compare_in_cells(grid, points, segments, chain, is_new, start, items, marks)
+    return marks
+
+
+@kernel
+def _bucket_segments(points: Floats, segments: Ints, cell: float, n_across: int, n_up: int) -> tuple[Ints, Ints]:
+    """Sort segments into the cells of the boxes around pieces of them, at most a cell long."""
+    start = np.zeros(n_across * n_up + 1, np.int64)
+    items = np.empty(0, np.int64)
+    for fill in range(2):
+        for k in range(len(segments)):
+            a, b = points[segments[k, 0]], points[segments[k, 1]]
+            pieces = int(max(abs(b[0] - a[0]), abs(b[1] - a[1])) / cell) + 1
+            done_left = done_right = done_low = done_high = -1
+            for p in range(pieces):
+                x0, x1 = a[0] + (b[0] - a[0]) * p / pieces, a[0] + (b[0] - a[0]) * (p + 1) / pieces
+                y0, y1 = a[1] + (b[1] - a[1]) * p / pieces, a[1] + (b[1] - a[1]) * (p + 1) / pieces
+                left, right = int(min(x0, x1) / cell), int(max(x0, x1) / cell)
+                low, high = int(min(y0, y1) / cell), int(max(y0, y1) / cell)
+                for row in range(low, high + 1):
+                    for column in range(left, right + 1):
+                        if done_left <= column <= done_right and done_low <= row <= done_high:
+                            continue
+                        at = row * n_across + column
+                        if fill:
+                            start[at] -= 1
+                            items[start[at]] = k
+                        else:
+                            start[at] += 1
+                done_left, done_right, done_low, done_high = left, right, low, high
+        if not fill:
+            start = np.cumsum(start)
+            items = np.empty(start[-1], np.int64)
+    return start, items
+
+
+@kernel
+def _compare_in_cells(
+    grid: Ints,
+    points: Floats,
+    segments: Ints,
+    chain: Ints,
+    is_new: Flags,
+    start: Ints,
+    items: Ints,
+    marks: NDArray[np.uint8],
+) -> None:
+    for at in range(len(start) - 1):
+        for i in range(start[at], start[at + 1]):
+            k = items[i]
+            for j in range(i + 1, start[at + 1]):
+                other = items[j]
+                if is_new[chain[k]] or is_new[chain[other]]:
+                    mark = _compare(grid, points, segments[k], segments[other])
+                    marks[k], marks[other] = max(marks[k], mark), max(marks[other], mark)
+    for k in range(len(segments)):
+        a, b = grid[segments[k, 0]], grid[segments[k, 1]]
+        if a[0] == b[0] and a[1] == b[1]:
+            marks[k] = CROSSING
+
+
+@kernel
+def _compare(grid: Ints, points: Floats, s: Ints, t: Ints) -> int:
+    """FREE, CLOSE or CROSSING for two segments."""
+    a, b, c, d = s[0], s[1], t[0], t[1]
+    if a == c or a == d or b == c or b == d:
+        if (a == c and b == d) or (a == d and b == c):
+            return CROSSING
+        if a == d or b == d:
+            c, d = d, c
+        if b == c:
+            a, b = b, a
+        ahead = (grid[b, 0] - grid[a, 0]) * (grid[d, 0] - grid[a, 0]) + (grid[b, 1] - grid[a, 1]) * (
+            grid[d, 1] - grid[a, 1]
+        )
+        return CROSSING if ahead > 0 and _orient(grid, a, b, d) == 0 else FREE
+    if _boxes_meet(grid, a, b, c, d):
+        o1, o2, o3, o4 = _orient(grid, a, b, c), _orient(grid, a, b, d), _orient(grid, c, d, a), _orient(grid, c, d, b)
+        if o1 * o2 <= 0 and o3 * o4 <= 0:
+            return CROSSING
+    if _is_close(points, a, b, c, d) or _is_close(points, c, d, a, b):
+        return CLOSE
+    return FREE
+
+
+@kernel
+def _orient(grid: Ints, a: int, b: int, c: int) -> int:
+    """Sign of the turn a, b, c."""
+    turn = (grid[b, 0] - grid[a, 0]) * (grid[c, 1] - grid[a, 1]) - (grid[b, 1] - grid[a, 1]) * (grid[c, 0] - grid[a, 0])
+    return int(turn > 0) - int(turn < 0)
+
+
+@kernel
+def _boxes_meet(grid: Ints, a: int, b: int, c: int, d: int) -> bool:
+    for k in range(2):
+        if max(grid[a, k], grid[b, k]) < min(grid[c, k], grid[d, k]) or max(grid[c, k], grid[d, k]) < min(
+            grid[a, k], grid[b, k]
+        ):
+            return False
+    return True
+
+
+@kernel
+def _is_close(points: Floats, a: int, b: int, c: int, d: int) -> bool:
+    """Is c or d nearer to the segment a b than a quarter of its length?"""
+    dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    length2 = dx * dx + dy * dy
+    for p in (c, d):
+        x, y = points[p, 0] - points[a, 0], points[p, 1] - points[a, 1]
+        t = min(max((x * dx + y * dy) / (length2 + 1e-300), 0.0), 1.0)
+        if (x - t * dx) ** 2 + (y - t * dy) ** 2 < _ROOM * _ROOM * length2:
+            return True
+    return False
+
+
+@kernel
+def mark_sharp(
+    points: Floats,
+    chain_points: Ints,
+    offsets: Ints,
+    node_offsets: Ints,
+    sockets: Ints,
+    least: float,
+    marks: NDArray[np.uint8],
+) -> None:
+    """Mark the segments on both sides of sectors of less than `least` radians, in place."""
+    for c in range(len(offsets) - 1):
+        first, last = offsets[c], offsets[c + 1] - 1
+        for i in range(first, last):
+            before = chain_points[i - 1] if i > first else chain_points[last - 1]
+            if i == first and chain_points[first] != chain_points[last]:
+                continue
+            if _sector(points, chain_points[i], before, chain_points[i + 1]) < least:
+                k = i - c
+                previous = k - 1 if i > first else last - 1 - c
+                marks[k], marks[previous] = max(marks[k], SHARP), max(marks[previous], SHARP)
+    for v in range(len(node_offsets) - 1):
+        for i in range(node_offsets[v], node_offsets[v + 1]):
+            k, p = _first_segment(sockets[i], chain_points, offsets)
+            for j in range(i + 1, node_offsets[v + 1]):
+                other, q = _first_segment(sockets[j], chain_points, offsets)
+                if _sector(points, v, p, q) < least:
+                    marks[k], marks[other] = max(marks[k], SHARP), max(marks[other], SHARP)
+
+
+@kernel
+def _first_segment(socket: int, chain_points: Ints, offsets: Ints) -> tuple[int, int]:
+    """Segment of a chain at one of its ends, and the point at the far side of it."""
+    c = socket // 2
+    if socket % 2:
+        return offsets[c + 1] - 2 - c, chain_points[offsets[c + 1] - 2]
+    return offsets[c] - c, chain_points[offsets[c] + 1]
+
+
+@kernel
+def _sector(points: Floats, v: int, p: int, q: int) -> float:
+    """Angle between the segments from v to p and to q."""
+    ux, uy = points[p, 0] - points[v, 0], points[p, 1] - points[v, 1]
+    wx, wy = points[q, 0] - points[v, 0], points[q, 1] - points[v, 1]
+    return abs(np.arctan2(ux * wy - uy * wx, ux * wx + uy * wy))

@@ -1,0 +1,88 @@
+"""The dense curves that smoothing works on: every chain with its own copy of all its points, and the ends they share."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.jit import kernel
+from imgquad_core.model import BoundaryGraph, PointKind
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+class Curves(NamedTuple):
+    """The pixel boundary, chain by chain.
+
+    Chain c has the dense points ``offsets[c]:offsets[c + 1]``; a closed one repeats its first point.
+    """
+
+    raw: Floats  #: (n, 2) points of the pixel boundary
+    arc: Floats  #: (n,) length along the chain up to each point
+    offsets: Ints  #: (n_chains + 1,)
+    ends: Ints  #: (n_chains, 2) node at either end; -1 closed
+    is_frame: Flags  #: (n_chains,) lies on the picture's border
+    node: Floats  #: (n_nodes, 2) place of each node in `raw`
+    node_kind: NDArray[np.uint8]  #: (n_nodes,) JUNCTION or CORNER
+    node_offsets: Ints  #: (n_nodes + 1,) CSR of `sockets`
+    sockets: Ints  #: 2 * chain + 0 for its start or 1 for its end
+
+
+def curves_of(graph: BoundaryGraph) -> Curves:
+    """Unpack a pixel boundary."""
+    raw = graph.points[graph.chain_points]
+    first, last = graph.chain_points[graph.chain_offsets[:-1]], graph.chain_points[graph.chain_offsets[1:] - 1]
+    is_node = (graph.point_kind == PointKind.JUNCTION) | (graph.point_kind == PointKind.CORNER)
+    open_ = is_node[first]
+    nodes = np.unique(np.concatenate([first[open_], last[open_]]))
+    ends = np.full((graph.n_chains, 2), -1, np.int64)
+    ends[open_, 0], ends[open_, 1] = np.searchsorted(nodes, first[open_]), np.searchsorted(nodes, last[open_])
+    sockets = np.flatnonzero(ends.ravel() >= 0)
+    at = ends.ravel()[sockets]
+    second = graph.chain_points[graph.chain_offsets[:-1] + 1]
+    return Curves(
+        raw,
+        arc_lengths(raw, np.array(graph.chain_offsets)),
+        np.array(graph.chain_offsets),
+        ends,
+        graph.point_kind[second] == PointKind.FRAME,
+        graph.points[nodes],
+        graph.point_kind[nodes],
+        np.concatenate([[0], np.cumsum(np.bincount(at, minlength=len(nodes)))]).astype(np.int64),
+        sockets[np.argsort(at, kind="stable")],
+    )
+
+
+@kernel
+def arc_lengths(points: Floats, offsets: Ints) -> Floats:
+    """Length along each chain up to each of its points."""
+    arc = np.zeros(len(points))
+    for c in range(len(offsets) - 1):
+        for i in range(offsets[c] + 1, offsets[c + 1]):
+            arc[i] = arc[i - 1] + np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
+    return arc
+
+
+@kernel
+def pin_ends(points: Floats, curves: Curves, node: Floats) -> None:
+    """Put chain ends on their nodes, in place; chains on the border become straight between theirs."""
+    for c in range(len(curves.ends)):
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        if curves.ends[c, 0] < 0:
+            points[last] = points[first]
+            continue
+        start, end = node[curves.ends[c, 0]], node[curves.ends[c, 1]]
+        points[first], points[last] = start, end
+        if curves.is_frame[c]:
+            for i in range(first + 1, last):
+                t = curves.arc[i] / curves.arc[last]
+                points[i] = start + t * (end - start)
+
+
+def per_point(curves: Curves, values: NDArray[Any]) -> NDArray[Any]:
+    """Repeat one value a chain for each of its dense points."""
+    return np.repeat(values, np.diff(curves.offsets))

@@ -1,0 +1,133 @@
+"""Junctions move to where the lines of their chains meet; ends on the border slide along it.
+
+The pixel corner that a junction starts from is up to 0.7 px off. A straight line through each of its chains, over a
+few pixels beyond the stairs at the junction itself, says where it should be; it moves by at most half a pixel.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imgquad_core.curves import Curves, Floats
+from imgquad_core.jit import kernel
+from imgquad_core.model import PointKind
+
+_NEAR, _FAR = 1.2, 8.0  # px of arc of a chain that its line is fitted to
+_PULL = 0.15  # weight of the old place against that of one line
+_FARTHEST = 0.5  # px that a node moves at most
+_ROOM = 0.35  # of the local feature size and of the shortest chain at the node, so that no two nodes can meet
+_BORDER_WINDOWS = np.array([48.0, 36.0, 27.0, 20.0, 15.0, 11.0])  # px of arc that say where a chain meets the border
+_BORDER_NOISE = 0.31  # px of residual up to which they are believed
+_JUNCTION = int(PointKind.JUNCTION)
+
+
+def place_junctions(curves: Curves, room: Floats, shape: tuple[int, int]) -> Floats:
+    """Find better places for the junctions.
+
+    Parameters
+    ----------
+    curves : Curves
+        The pixel boundary.
+    room : float64, shape (n,)
+        How far each dense point may move.
+    shape : tuple of int
+        (n_rows, n_cols) of the picture.
+
+    Returns
+    -------
+    float64, shape (n_nodes, 2)
+        New place of each node; those on the border moved along it, the picture's corners not at all.
+    """
+    return _place(curves, room, float(shape[1]), float(shape[0]), _BORDER_WINDOWS)
+
+
+@kernel
+def _place(curves: Curves, room: Floats, width: float, height: float, windows: Floats) -> Floats:
+    placed = curves.node.copy()
+    for v in range(len(placed)):
+        if curves.node_kind[v] != _JUNCTION:
+            continue
+        x, y = curves.node[v]
+        on_side, on_end = x == 0 or x == width, y == 0 or y == height
+        if on_side or on_end:
+            dx, dy = _slide(curves, v, 0 if on_end else 1, windows)
+        else:
+            dx, dy = _meet(curves, v)
+        limit = _limit(curves, room, v)
+        size = np.hypot(dx, dy)
+        if size > limit:
+            dx, dy = dx * limit / size, dy * limit / size
+        placed[v, 0], placed[v, 1] = x + dx, y + dy
+    return placed
+
+
+@kernel
+def _limit(curves: Curves, room: Floats, v: int) -> float:
+    limit = _FARTHEST
+    for socket in curves.sockets[curves.node_offsets[v] : curves.node_offsets[v + 1]]:
+        c = socket // 2
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        limit = min(limit, _ROOM * curves.arc[last], room[last if socket % 2 else first])
+    return limit
+
+
+@kernel
+def _line(curves: Curves, socket: int, near: float, far: float) -> tuple[int, float, float, float, float, float]:
+    """Total least squares line through a chain from arc `near` to `far` away from one of its ends.
+
+    Gives the number of points, a point on the line relative to the end, its direction, the residual (rms).
+    """
+    c = socket // 2
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    end, step = (last, -1) if socket % 2 else (first, 1)
+    n, i = 0, end
+    x = y = xx = xy = yy = 0.0
+    while first <= i <= last and abs(curves.arc[i] - curves.arc[end]) <= far:
+        if abs(curves.arc[i] - curves.arc[end]) >= near:
+            dx, dy = curves.raw[i, 0] - curves.raw[end, 0], curves.raw[i, 1] - curves.raw[end, 1]
+            n, x, y, xx, xy, yy = n + 1, x + dx, y + dy, xx + dx * dx, xy + dx * dy, yy + dy * dy
+        i += step
+    if n == 0:
+        return 0, 0.0, 0.0, 1.0, 0.0, 0.0
+    x, y = x / n, y / n
+    xx, xy, yy = xx / n - x * x, xy / n - x * y, yy / n - y * y
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    spread = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
+    return n, x, y, np.cos(angle), np.sin(angle), np.sqrt(max(spread, 0.0))
+
+
+@kernel
+def _meet(curves: Curves, v: int) -> tuple[float, float]:
+    """Shift of a node to the point nearest to the lines of its chains."""
+    a, b, d, p, q = _PULL, 0.0, _PULL, 0.0, 0.0
+    for socket in curves.sockets[curves.node_offsets[v] : curves.node_offsets[v + 1]]:
+        n, x, y, tx, ty, _ = _line(curves, socket, _NEAR, _FAR)
+        if n < 3:
+            continue
+        off = tx * y - ty * x
+        a, b, d = a + ty * ty, b - tx * ty, d + tx * tx
+        p, q = p - ty * off, q + tx * off
+    det = a * d - b * b
+    return (d * p - b * q) / det, (a * q - b * p) / det
+
+
+@kernel
+def _slide(curves: Curves, v: int, axis: int, windows: Floats) -> tuple[float, float]:
+    """Shift of a node along the border, to where the lines of its inner chains meet it."""
+    total, count = 0.0, 0
+    for socket in curves.sockets[curves.node_offsets[v] : curves.node_offsets[v + 1]]:
+        if curves.is_frame[socket // 2]:
+            continue
+        for far in windows:
+            n, x, y, tx, ty, rms = _line(curves, socket, 0.4, far)
+            c = socket // 2
+            along, across = (tx, ty) if axis == 0 else (ty, tx)
+            if n < 12 or far > curves.arc[curves.offsets[c + 1] - 1] or rms > _BORDER_NOISE or abs(across) < 0.35:
+                continue
+            start, height = (x, y) if axis == 0 else (y, x)
+            total, count = total + start - height * along / across, count + 1
+            break
+    if count == 0:
+        return 0.0, 0.0
+    shift = total / count
+    return (shift, 0.0) if axis == 0 else (0.0, shift)

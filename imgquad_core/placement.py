@@ -1,0 +1,151 @@
+"""Where the nodes lie on the curves, and how many there are.
+
+The paper moves each sample to the point of the curve that is equally far from both neighbours, and repeats this
+until the edges' lengths agree. The same is had at once by nodes at equal steps of the integral of ds / size between
+two corners: neighbours differ by what the size differs. What is left (a chord is shorter than its arc) is evened out
+by the paper's move, `even_out`, on the curve itself and in whatever direction it runs.
+
+    o = coarse node (even place), . = node halfway between them (odd place), x = corner or end of the chain
+
+    x--.--o--.--o--.--o--.--x     4 coarse segments, 8 final edges
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imgquad_core.curves import Curves, Flags, Floats, Ints
+from imgquad_core.jit import kernel
+
+_LONG = 2.6  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
+_COARSE = 0.6  # mean size over asked size from which that is of use
+_SWEEPS = 3
+
+
+class Placement(NamedTuple):
+    """Nodes on the curves: chain c has ``at[offsets[c]:offsets[c + 1]]``, both ends among them."""
+
+    offsets: Ints
+    at: Floats  #: place as a fractional index of dense points
+    is_corner: Flags
+
+
+@kernel
+def place_nodes(
+    curves: Curves, size: Floats, limit: Floats, is_corner: Flags, at_least: Ints, exact: Flags
+) -> Placement:
+    """Place the final nodes on every chain.
+
+    Parameters
+    ----------
+    curves : Curves
+        The chains.
+    size, limit : float64, shape (n,)
+        Wanted length of final edges at each dense point, and the asked one.
+    is_corner : bool, shape (n,)
+        Dense points that become nodes.
+    at_least : int64, shape (n_chains,)
+        Least number of coarse segments of each chain.
+    exact : bool, shape (n_chains,)
+        Chains that get a coarse node at every dense point.
+
+    Returns
+    -------
+    Placement
+        An even number of final edges for every piece between corners.
+    """
+    cost = np.zeros(len(size))
+    n_nodes = 0
+    for c in range(len(exact)):
+        for i in range(curves.offsets[c] + 1, curves.offsets[c + 1]):
+            step = curves.arc[i] - curves.arc[i - 1]
+            cost[i] = cost[i - 1] + 2 * step / (size[i] + size[i - 1])
+            n_nodes += 2
+        n_nodes += 8 + int(cost[curves.offsets[c + 1] - 1]) * 2
+    offsets = np.zeros(len(exact) + 1, np.int64)
+    at = np.empty(n_nodes + 16 * np.sum(is_corner))
+    corner = np.zeros(len(at), np.bool_)
+    for c in range(len(exact)):
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        n = offsets[c]
+        at[n] = first
+        corner[n] = is_corner[first]
+        begin = first
+        for i in range(first + 1, last + 1):
+            if i < last and not is_corner[i] and not exact[c]:
+                continue
+            whole = begin == first and i == last
+            number = 1 if exact[c] else _count(curves, cost, limit, begin, i, at_least[c], whole)
+            _divide(cost, begin, i, 2 * number, at, n)
+            n += 2 * number
+            corner[n] = is_corner[i]
+            begin = i
+        offsets[c + 1] = n + 1
+    return Placement(offsets, at[: offsets[-1]].copy(), corner[: offsets[-1]].copy())
+
+
+@kernel
+def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, at_least: int, whole: bool) -> int:
+    """Number of coarse segments of a piece."""
+    total = 0.5 * (cost[end] - cost[begin])
+    length = curves.arc[end] - curves.arc[begin]
+    least = at_least if whole else (at_least + 1) // 2
+    if total > _LONG and length > 2 * _COARSE * total * limit[begin]:
+        return max(2 * int(round(0.5 * total)), 2 * ((least + 1) // 2))
+    return max(int(np.ceil(total - 0.3)), least)
+
+
+@kernel
+def _divide(cost: Floats, begin: int, end: int, number: int, at: Floats, n: int) -> None:
+    """Put `number` equal steps of cost between two dense points behind node n."""
+    j = begin
+    for k in range(1, number):
+        target = cost[begin] + (cost[end] - cost[begin]) * k / number
+        while j < end - 1 and cost[j + 1] < target:
+            j += 1
+        at[n + k] = j + (target - cost[j]) / (cost[j + 1] - cost[j])
+    at[n + number] = end
+
+
+@kernel
+def points_at(points: Floats, at: Floats) -> Floats:
+    """Points of the curves at fractional indices."""
+    found = np.empty((len(at), 2))
+    for k in range(len(at)):
+        i = min(int(at[k]), len(points) - 2)
+        t = at[k] - i
+        found[k, 0] = points[i, 0] + t * (points[i + 1, 0] - points[i, 0])
+        found[k, 1] = points[i, 1] + t * (points[i + 1, 1] - points[i, 1])
+    return found
+
+
+@kernel
+def even_out(points: Floats, placed: Placement, exact: Flags, edge_ratio: float) -> None:
+    """Move nodes towards the bisector of their neighbours, along the curve, until edges keep within `edge_ratio`."""
+    at = placed.at
+    xy = points_at(points, at)
+    for c in range(len(placed.offsets) - 1):
+        for _ in range(0 if exact[c] else _SWEEPS):
+            for k in range(placed.offsets[c] + 1, placed.offsets[c + 1] - 1):
+                before = np.hypot(xy[k, 0] - xy[k - 1, 0], xy[k, 1] - xy[k - 1, 1])
+                after = np.hypot(xy[k + 1, 0] - xy[k, 0], xy[k + 1, 1] - xy[k, 1])
+                if placed.is_corner[k] or max(before, after) <= edge_ratio * min(before, after):
+                    continue
+                at[k] = 0.5 * (at[k] + _bisector_crossing(points, at[k - 1], at[k + 1], xy[k - 1], xy[k + 1]))
+                xy[k] = points_at(points, at[k : k + 1])[0]
+
+
+@kernel
+def _bisector_crossing(points: Floats, low: float, high: float, a: Floats, b: Floats) -> float:
+    """Where the curve between two nodes crosses the perpendicular bisector of their chord."""
+    middle = np.array([0.5 * (low + high)])
+    for _ in range(20):
+        x, y = points_at(points, middle)[0]
+        if (x - a[0]) ** 2 + (y - a[1]) ** 2 < (x - b[0]) ** 2 + (y - b[1]) ** 2:
+            low = middle[0]
+        else:
+            high = middle[0]
+        middle[0] = 0.5 * (low + high)
+    return middle[0]

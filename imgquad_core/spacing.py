@@ -1,0 +1,139 @@
+"""The final edge length wanted at every dense point of the curves.
+
+It is the least of the asked size, a share of the local feature size, and what the bend of the curve allows; it then
+grows away from fine places no faster than `growth` from one element to the next, through the plane (a raster of the
+picture) and along the chain (where neighbouring edges keep within `edge_ratio`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imgquad_core.curves import Curves, Floats
+from imgquad_core.features import local_feature_size
+from imgquad_core.jit import kernel
+
+FINEST = 0.25  #: px, smallest edge length asked for: half of the narrowest boundary that pixels can make
+_ACROSS = 0.85  # edge length over local feature size: two coarse segments are at most 1.7 times as long as it is wide
+_BEND = 4.0  # arc over distance of a foreign point; chains that meet at more than 29 degrees do not count as thin
+_TURN = 0.55  # radians from one edge to the next
+_OVER = 2.0  # px of arc to each side over which the bend is measured
+
+
+def edge_sizes(
+    points: Floats, curves: Curves, limit: Floats, is_corner: Floats, growth: float, edge_ratio: float,
+    shape: tuple[int, int],
+) -> Floats:
+    """Wanted length of final edges at each dense point.
+
+    Parameters
+    ----------
+    points : float64, shape (n, 2)
+        Smoothed dense points.
+    curves : Curves
+        Their chains.
+    limit : float64, shape (n,)
+        Largest length asked for at each point.
+    is_corner : bool, shape (n,)
+        Points where the curve may turn at once.
+    growth, edge_ratio : float
+        Largest ratio of neighbouring elements, and of neighbouring edges of a chain.
+    shape : tuple of int
+        (n_rows, n_cols) of the picture.
+
+    Returns
+    -------
+    float64, shape (n,)
+        Length in pixels.
+    """
+    reach = min(float(limit.max()) / _ACROSS, float(np.hypot(*shape)))
+    lfs = local_feature_size(points, curves, reach, _BEND)
+    size = np.minimum(limit, _ACROSS * lfs)
+    _limit_turn(points, curves.offsets, curves.arc, is_corner, size)
+    size = np.minimum(np.maximum(size, FINEST), limit)
+    return grade(size, points, curves, growth, edge_ratio, shape)
+
+
+def grade(
+    size: Floats, points: Floats, curves: Curves, growth: float, edge_ratio: float, shape: tuple[int, int]
+) -> Floats:
+    """Limit how fast `size` grows away from fine places."""
+    slope = 2.0 * (growth - 1.0) / (growth + 1.0)
+    if size.min() < size.max():
+        raster = np.full(shape, np.inf, np.float32)
+        size = _grade_plane(size, points, slope, raster)
+    return _grade_chains(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
+
+
+@kernel
+def _limit_turn(points: Floats, offsets: Floats, arc: Floats, is_corner: Floats, size: Floats) -> None:
+    for c in range(len(offsets) - 1):
+        first, last = offsets[c], offsets[c + 1] - 1
+        back = ahead = first
+        for i in range(first + 1, last):
+            while arc[i] - arc[back] > _OVER:
+                back += 1
+            while ahead < last and arc[ahead] - arc[i] < _OVER:
+                ahead += 1
+            if np.any(is_corner[back : ahead + 1]):
+                continue
+            ux, uy = points[i] - points[back]
+            vx, vy = points[ahead] - points[i]
+            turn = abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
+            apart = 0.5 * (np.hypot(ux, uy) + np.hypot(vx, vy))
+            if turn * size[i] > _TURN * apart:
+                size[i] = _TURN * apart / turn
+
+
+@kernel
+def _grade_plane(size: Floats, points: Floats, slope: float, raster: Floats) -> Floats:
+    """Two chamfer passes over the pixels, then back to the points."""
+    n_rows, n_cols = raster.shape
+    for i in range(len(size)):
+        r, c = min(int(points[i, 1]), n_rows - 1), min(int(points[i, 0]), n_cols - 1)
+        raster[r, c] = min(raster[r, c], np.float32(size[i]))
+    straight, slanting = np.float32(slope), np.float32(slope * np.sqrt(2.0))
+    for r in range(n_rows):
+        for c in range(n_cols):
+            best = raster[r, c]
+            if c > 0:
+                best = min(best, raster[r, c - 1] + straight)
+            if r > 0:
+                best = min(best, raster[r - 1, c] + straight)
+                if c > 0:
+                    best = min(best, raster[r - 1, c - 1] + slanting)
+                if c < n_cols - 1:
+                    best = min(best, raster[r - 1, c + 1] + slanting)
+            raster[r, c] = best
+    for r in range(n_rows - 1, -1, -1):
+        for c in range(n_cols - 1, -1, -1):
+            best = raster[r, c]
+            if c < n_cols - 1:
+                best = min(best, raster[r, c + 1] + straight)
+            if r < n_rows - 1:
+                best = min(best, raster[r + 1, c] + straight)
+                if c > 0:
+                    best = min(best, raster[r + 1, c - 1] + slanting)
+                if c < n_cols - 1:
+                    best = min(best, raster[r + 1, c + 1] + slanting)
+            raster[r, c] = best
+    graded = size.copy()
+    for i in range(len(size)):
+        r, c = min(int(points[i, 1]), n_rows - 1), min(int(points[i, 0]), n_cols - 1)
+        graded[i] = min(size[i], raster[r, c])
+    return graded
+
+
+@kernel
+def _grade_chains(size: Floats, arc: Floats, offsets: Floats, ends: Floats, slope: float) -> Floats:
+    size = size.copy()
+    for c in range(len(offsets) - 1):
+        first, last = offsets[c], offsets[c + 1] - 1
+        for _ in range(1 if ends[c, 0] >= 0 else 2):  # a closed chain needs the second round
+            if ends[c, 0] < 0:
+                size[first] = size[last] = min(size[first], size[last])
+            for i in range(first + 1, last + 1):
+                size[i] = min(size[i], size[i - 1] + slope * (arc[i] - arc[i - 1]))
+            for i in range(last - 1, first - 1, -1):
+                size[i] = min(size[i], size[i + 1] + slope * (arc[i + 1] - arc[i]))
+    return size
