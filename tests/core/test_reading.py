@@ -162,13 +162,13 @@ def test_the_orientation_tag_is_followed_as_viewers_do(tmp_path: Path, orientati
 
 
 def test_a_stack_names_its_remedy_and_the_remedy_works(tmp_path: Path) -> None:
-    stack = np.stack([GREY, GREY[::-1], GREY // 2])
+    stack = np.tile(np.stack([GREY, GREY[::-1], GREY // 2]), (1, 1, 2))
     tifffile.imwrite(tmp_path / "s.tif", stack, photometric="minisblack")
     tifffile.imwrite(tmp_path / "i.tif", stack, imagej=True)
     Image.fromarray(stack[0]).save(
         tmp_path / "s.gif", save_all=True, append_images=[Image.fromarray(s) for s in stack[1:]]
     )
-    np.save(tmp_path / "s.npy", np.tile(GREY, (7, 1, 2)))
+    np.save(tmp_path / "s.npy", stack)
     for name in ("s.tif", "i.tif", "s.gif", "s.npy"):
         with pytest.raises(InputError, match=r"holds \d pictures .*frame"):
             read_picture(tmp_path / name)
