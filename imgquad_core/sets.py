@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh, Ints, Names, name_materials
+from imgquad_core.femesh import FEMesh, Ints, Names, half_edge_twins, name_materials
 from imgquad_core.model import PointKind, QuadMesh
 
 BORDERS = ("left", "right", "bottom", "top")
@@ -72,16 +72,6 @@ def fe_mesh(mesh: QuadMesh) -> FEMesh:
         chain_offsets=mesh.chain_offsets,
         chain_points=mesh.chain_points,
     )
-
-
-def half_edge_twins(quads: Ints, n_points: int) -> Ints:
-    """Twin of half-edge ``4 q + k``, which runs from ``quads[q, k]`` to ``quads[q, (k + 1) % 4]``; -1 on a border."""
-    tails, heads = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
-    forward, backward = tails * n_points + heads, heads * n_points + tails
-    order = np.argsort(forward)
-    at = np.minimum(np.searchsorted(forward, backward, sorter=order), len(order) - 1)
-    twin = order[at]
-    return np.where(forward[twin] == backward, twin, -1)
 
 
 def _ends(mesh: QuadMesh, half_edges: Ints) -> Ints:

@@ -14,6 +14,7 @@ from imgquad_core.femesh import FEMesh, Ints
 from imgquad_core.properties import Properties, read_properties, values_of
 from imgquad_core.writers.common import rows, safe_names, wrapped, write_text
 from imgquad_core.writers.decks import DECKS, deck_text
+from imgquad_core.writers.interfaces import interface_text
 
 #: element type by analysis and kind; a reduced one has an R behind it
 ELEMENTS: Mapping[str, Mapping[str, str]] = {
@@ -50,6 +51,7 @@ def write_abaqus(
     properties: str | Path | Mapping[str, Any] | None = None,
     deck: str | None = None,
     regions: bool = False,
+    interfaces: str | None = None,
 ) -> None:
     """Write an Abaqus input file (``.inp``) that CalculiX reads too.
 
@@ -74,6 +76,9 @@ def write_abaqus(
         that runs as it is (in CalculiX; for Abaqus give ``thermal`` the analysis ``heat``).
     regions : bool
         Also write an element set for each connected region.
+    interfaces : str, optional
+        Cohesive elements as ``elements`` (COH2D4, COH3D8) or as ``springs`` (SPRING2: CalculiX has no cohesive
+        elements; the default in a deck).
 
     Raises
     ------
@@ -94,11 +99,14 @@ def write_abaqus(
         raise InputError(f"there is no deck '{deck}'; choose one of: {', '.join(DECKS)}")
     sets = {**mesh.material_cells(), **(mesh.region_cells() if regions else {})}
     labels = Labels(
-        safe_names(sets, NAME_LIMIT, reserved=("EALL",), upper=True),
+        safe_names([*sets, *mesh.cohesive_cells()], NAME_LIMIT, reserved=("EALL",), upper=True),
         safe_names(mesh.node_sets, NAME_LIMIT, reserved=("NALL",), upper=True),
         safe_names([f"S_{name}" for name in mesh.side_sets], NAME_LIMIT, upper=True),
     )
     parts = [*_head(mesh, element), *_sets(mesh, sets, labels), *_sections(mesh, labels, values, thickness)]
+    if len(mesh.cohesive):
+        chosen_form = interfaces or ("springs" if deck else "elements")
+        parts += interface_text(mesh, labels.elements, values, thickness, chosen_form)
     if deck is not None:
         parts += deck_text(mesh, deck, values, labels.elements, labels.nodes)
     write_text(path, parts)

@@ -109,8 +109,9 @@ def _hold_island(mesh: FEMesh, part: Ints) -> Iterator[tuple[int, tuple[int, ...
 
 
 def _parts(mesh: FEMesh) -> list[Ints]:
-    """Nodes of each connected part, ascending, in order of their first nodes."""
-    links = [mesh.cells[:, [a, b]] for a in (0,) for b in range(1, KINDS[mesh.kind].n_nodes)]
+    """Nodes of each part that elements, cohesive ones too, hold together; ascending."""
+    links = [mesh.cells[:, [0, other]] for other in range(1, KINDS[mesh.kind].n_nodes)]
+    links += [mesh.cohesive[:, [0, other]] for other in range(1, mesh.cohesive.shape[1])]
     pairs = np.concatenate(links)
     graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(mesh.n_points,) * 2)
     n_parts, part_of = connected_components(graph, directed=False)

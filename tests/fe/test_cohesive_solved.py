@@ -1,0 +1,83 @@
+"""Interfaces open under load as their stiffness says, in CalculiX."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ccx import needs_ccx, solve
+from handmade import jiggle_beside, round_inclusion, staircase
+from imgquad_core.cohesive import split_interfaces
+from imgquad_core.femesh import FEMesh
+from imgquad_core.second_order import second_order
+from imgquad_core.sets import fe_mesh
+from imgquad_core.writers import write_mesh
+
+pytestmark = needs_ccx
+
+
+def two_blocks(order: int) -> FEMesh:
+    halves = np.repeat([0, 1], 4)[None, :].repeat(6, axis=0)
+    mesh = fe_mesh(staircase(halves, ("a", "b"), jiggle_beside(0, 4)))
+    return second_order(mesh) if order == 2 else mesh
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("shear", [1000.0, 250.0])
+def test_a_bar_with_an_interface_opens_as_springs_in_series(tmp_path: Path, order: int, shear: float) -> None:
+    mesh = split_interfaces(two_blocks(order))
+    values = {
+        "*": {"young": 2000.0, "poisson": 0.0},
+        "*:*": {"normal_stiffness": 1000.0, "shear_stiffness": shear},
+    }
+    write_mesh(mesh, tmp_path / "a.inp", properties=values, deck="tension")
+    found = solve(tmp_path / "a.inp", "*EL PRINT, ELSET=EALL\nS\n*NODE PRINT, NSET=NALL\nU")
+    stress = 0.008 / (8 / 2000 + 1 / 1000)
+    assert np.abs(found["stresses"][:, 2:] - [stress, 0, 0, 0, 0, 0]).max() < 1e-6 * stress
+    u = found["displacements"][:, 1:3]
+    for below, above in ((0, 3), (1, 2)):
+        opening = u[mesh.cohesive[:, above]] - u[mesh.cohesive[:, below]]
+        assert np.abs(opening - [stress / 1000, 0]).max() < 1e-6 * stress / 1000
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_slanted_interface_is_stiff_along_its_own_axes(tmp_path: Path, order: int) -> None:
+    mesh = two_blocks(order)
+    mesh = split_interfaces(replace(mesh, points=mesh.points + 0.5 * mesh.points[:, [1, 1]] * [1, 0]))
+    values = {
+        "*": {"young": 1e9, "poisson": 0.0},
+        "*:*": {"normal_stiffness": 1000.0, "shear_stiffness": 250.0},
+    }
+    write_mesh(mesh, tmp_path / "a.inp", properties=values, deck="tension")
+    text = (tmp_path / "a.inp").read_text()
+    text = text.replace("*STEP\n*STATIC\n*BOUNDARY\n", "*STEP\n*STATIC\n*BOUNDARY\nLEFT, 2, 2\nRIGHT, 2, 2\n")
+    (tmp_path / "a.inp").write_text(text)
+    force = solve(tmp_path / "a.inp")["total force"][0, :2]
+    along = np.array([3.0, 6.0])
+    length = np.linalg.norm(along)
+    t = along / length
+    n = np.array([t[1], -t[0]])
+    stiffness = length * (1000 * np.outer(n, n) + 250 * np.outer(t, t))
+    pulled = 1e-3 * np.ptp(mesh.points[:, 0])
+    assert force == pytest.approx(stiffness @ [pulled, 0], rel=1e-4)
+
+
+def test_a_weak_interface_lets_an_inclusion_go(tmp_path: Path) -> None:
+    whole = fe_mesh(round_inclusion(6, 10, 40, 3))
+    split = split_interfaces(whole)
+    pulls = []
+    for stiffness in (1e-3, 1.0, 1e6):
+        values = {
+            "*": {"young": 1000.0, "poisson": 0.3},
+            "matrix:disk": {"normal_stiffness": stiffness, "shear_stiffness": stiffness},
+        }
+        write_mesh(split, tmp_path / "a.inp", properties=values, deck="tension")
+        pulls.append(solve(tmp_path / "a.inp")["total force"][0, 0])
+    write_mesh(whole, tmp_path / "a.inp", properties=values, deck="tension")
+    bonded = solve(tmp_path / "a.inp")["total force"][0, 0]
+    assert pulls[0] < pulls[1] < pulls[2] < bonded
+    assert pulls[2] == pytest.approx(bonded, rel=1e-3)
+    assert pulls[0] < 0.85 * bonded
