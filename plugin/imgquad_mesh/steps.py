@@ -1,0 +1,361 @@
+"""What each of our filters does to the picture and the meshes of a script: one function a filter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.assembly import assemble_mesh
+from imgquad_core.boundary import ExtractionOptions, extract_boundaries
+from imgquad_core.denoise import DenoiseOptions, list_removed, remove_noise
+from imgquad_core.errors import InputError
+from imgquad_core.meshing import MeshingOptions, mesh_boundaries
+from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
+from imgquad_core.pipeline import MeshOptions, run
+from imgquad_core.quality import aspect, corner_angles, material_areas, quad_areas, quality_report, scaled_jacobian
+from imgquad_core.segmentation import SegmentationOptions
+from imgquad_core.selection import Box, crop_image, drop_materials
+from imgquad_core.sets import fe_mesh
+from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
+
+from imgquad_mesh.crosscheck import boundary_lengths, material_perimeters
+from imgquad_mesh.files import check_target, mesh_extensions, write_labels, write_mesh_file
+from imgquad_mesh.layer import Layer, polyline
+from imgquad_mesh.meshlab import face_materials, quad_layer, quad_mesh
+
+
+class Meshes(Protocol):
+    """Layers in order, one of them current: in Python, in a MeshSet, or in the process that has one."""
+
+    def add(self, layer: Layer) -> int:
+        """Add a layer, make it the current one, return its id."""
+
+    def layer(self, mesh: int | None = None) -> Layer:
+        """Return the current layer, or the one with this id."""
+
+    def give(self, do: str, values: NDArray[Any]) -> None:
+        """Set points (``move``), a value a face (``set_scalar``) or a colour a face (``set_color``), in place."""
+
+    @property
+    def layers(self) -> tuple[list[int], int | None]:
+        """Ids of all layers and of the current one."""
+
+
+class LayerList:
+    """The layers of a script that has met no filter of MeshLab yet."""
+
+    def __init__(self) -> None:
+        self._layers: list[Layer] = []
+
+    def add(self, layer: Layer) -> int:
+        """Add a layer, make it the current one, return its id."""
+        self._layers.append(layer)
+        return len(self._layers) - 1
+
+    def layer(self, mesh: int | None = None) -> Layer:
+        """Return the current layer, or the one with this id."""
+        return self._layers[-1 if mesh is None else mesh]
+
+    def give(self, do: str, values: NDArray[Any]) -> None:
+        """Set points (``move``), a value a face (``set_scalar``) or a colour a face (``set_color``), in place."""
+        part = {"move": "points", "set_scalar": "face_scalar", "set_color": "face_color"}[do]
+        changed: dict[str, Any] = {part: values}
+        self._layers[-1] = replace(self._layers[-1], **changed)
+
+    @property
+    def layers(self) -> tuple[list[int], int | None]:
+        """Ids of all layers and of the current one."""
+        n = len(self._layers)
+        return list(range(n)), n - 1 if n else None
+
+
+@dataclass
+class State:
+    """What a script works on.
+
+    Parameters
+    ----------
+    meshes : Meshes
+        The layers.
+    image : path, array or LabelImage, optional
+        The picture as given.
+    folder : Path
+        Where the files of the script are.
+    """
+
+    meshes: Meshes
+    image: Any = None
+    folder: Path = field(default_factory=Path)
+    labels: LabelImage | None = None
+    pixel_boundary: BoundaryGraph | None = None
+    boundary: BoundaryGraph | None = None
+    made: dict[int, QuadMesh] = field(default_factory=dict)  # meshes of ours by the id of their layer
+
+    def need_labels(self) -> LabelImage:
+        """Return the labelled picture; the picture is segmented with the defaults where no filter has done it."""
+        if self.labels is None:
+            _segment(self, SegmentationOptions())
+        assert self.labels is not None
+        return self.labels
+
+    def need_pixel_boundary(self) -> BoundaryGraph:
+        """Return the pixel boundary, extracted with the defaults where no filter has done it."""
+        if self.pixel_boundary is None:
+            _extract(self, ExtractionOptions())
+        assert self.pixel_boundary is not None
+        return self.pixel_boundary
+
+    def put_labels(self, labels: LabelImage) -> None:
+        """Make another labelled picture the current one; boundaries of the former are dropped."""
+        self.labels, self.pixel_boundary, self.boundary = labels, None, None
+
+    def put_mesh(self, mesh: QuadMesh) -> None:
+        """Add a mesh as the current layer."""
+        self.made[self.meshes.add(quad_layer(mesh))] = mesh
+
+    def mesh(self) -> QuadMesh:
+        """Return the current layer as a mesh of quads.
+
+        A mesh made here keeps its regions and chains as long as MeshLab's filters leave its quads as they are.
+        """
+        _, current = self.meshes.layers
+        if current is None:
+            raise InputError("there is no mesh yet; make one, or give one as input")
+        layer = self.meshes.layer()
+        made = self.made.get(current)
+        if made is not None and np.array_equal(made.quads.ravel(), layer.face_points) and layer.n_faces == made.n_quads:
+            return _moved(made, layer)
+        return quad_mesh(layer, self.labels.materials if self.labels else None)
+
+
+def _moved(mesh: QuadMesh, layer: Layer) -> QuadMesh:
+    if np.array_equal(mesh.points, layer.points[:, :2]) and not layer.points[:, 2].any():
+        return mesh
+    if (quad_areas(layer.points, mesh.quads) > 0.0).all() and not np.ptp(layer.points[:, 2]):
+        return replace(mesh, points=layer.points[:, :2])
+    return quad_mesh(layer, mesh.materials)
+
+
+@dataclass(frozen=True)
+class CropOptions:
+    """The part of a picture that stays: left, upper, right, lower bound in pixels, from the upper left corner."""
+
+    crop: Box | None = None
+
+
+@dataclass(frozen=True)
+class DropOptions:
+    """Names or numbers of the materials that are left out."""
+
+    drop: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class QualityOptions:
+    """Which measure each quad gets as its value."""
+
+    metric: str = "scaled Jacobian"
+
+
+@dataclass(frozen=True)
+class NoOptions:
+    """A filter without parameters."""
+
+
+@dataclass(frozen=True)
+class MeshFileOptions:
+    """Where the mesh is written; the extension names the format."""
+
+    file_name: str = "mesh.vtu"
+
+
+@dataclass(frozen=True)
+class LabelFileOptions:
+    """Where the labelled picture is written."""
+
+    file_name: str = "labels.npy"
+
+
+def _segment(state: State, options: SegmentationOptions) -> dict[str, Any]:
+    from imgquad_core.pipeline import segment_source
+
+    if state.image is None:
+        raise InputError("there is no picture; give one as input")
+    found = segment_source(state.image, options)
+    state.put_labels(found.image)
+    return _label_counts(found.image)
+
+
+def _label_counts(image: LabelImage) -> dict[str, Any]:
+    numbers, counts = np.unique(image.labels, return_counts=True)
+    pixels = {image.materials.name_of(int(n)): int(c) for n, c in zip(numbers, counts, strict=True) if n >= 0}
+    return {"materials_number": len(pixels), "pixels": pixels}
+
+
+def _remove_noise(state: State, options: DenoiseOptions) -> dict[str, Any]:
+    before = state.need_labels()
+    after = remove_noise(before, options)
+    state.put_labels(after)
+    removed = list_removed(before, after)
+    return {"removed_clusters": sum(r.clusters for r in removed), "removed_pixels": sum(r.pixels for r in removed)}
+
+
+def _crop(state: State, options: CropOptions) -> dict[str, Any]:
+    image = state.need_labels()
+    state.put_labels(crop_image(image, options.crop) if options.crop else image)
+    return {"rows": state.need_labels().shape[0], "columns": state.need_labels().shape[1]}
+
+
+def _drop(state: State, options: DropOptions) -> dict[str, Any]:
+    state.put_labels(drop_materials(state.need_labels(), options.drop))
+    return _label_counts(state.need_labels())
+
+
+def _extract(state: State, options: ExtractionOptions) -> dict[str, Any]:
+    state.pixel_boundary, state.boundary = extract_boundaries(state.need_labels(), options), None
+    return _put_boundary(state, state.pixel_boundary, "pixel boundary")
+
+
+def _smooth(state: State, options: SmoothingOptions) -> dict[str, Any]:
+    state.boundary = smooth_boundaries(state.need_pixel_boundary(), options)
+    return _put_boundary(state, state.boundary, "smoothed boundary")
+
+
+def _put_boundary(state: State, graph: BoundaryGraph, label: str) -> dict[str, Any]:
+    state.meshes.add(polyline(graph.points, graph.segments, label=label))
+    return {"chains_number": graph.n_chains, "regions_number": len(graph.region_label), "points_number": len(graph.points)}
+
+
+def _mesh_boundary(state: State, options: MeshingOptions) -> dict[str, Any]:
+    if state.boundary is None:
+        smoothing = SmoothingOptions(size=options.size, growth=options.growth, material_sizes=options.material_sizes)
+        _smooth(state, smoothing)
+    assert state.boundary is not None
+    mesh = mesh_boundaries(state.boundary, options, state.need_labels().materials)
+    state.put_mesh(mesh)
+    return _size_of(mesh)
+
+
+def _mesh_image(state: State, options: MeshOptions) -> dict[str, Any]:
+    if state.image is None:
+        raise InputError("there is no picture; give one as input")
+    done = run(state.labels if state.labels is not None else state.image, options)
+    state.labels, state.pixel_boundary, state.boundary = done.labels, done.pixel_boundary, done.boundary
+    state.put_mesh(done.mesh)
+    return _size_of(done.mesh)
+
+
+def _size_of(mesh: QuadMesh) -> dict[str, Any]:
+    return {"quads_number": mesh.n_quads, "points_number": mesh.n_points}
+
+
+_METRICS: Mapping[str, Callable[[NDArray[np.float64], NDArray[np.int64]], NDArray[np.float64]]] = {
+    "scaled Jacobian": scaled_jacobian,
+    "least angle": lambda points, quads: corner_angles(points, quads).min(axis=1),
+    "largest angle": lambda points, quads: corner_angles(points, quads).max(axis=1),
+    "aspect": aspect,
+    "area": quad_areas,
+}
+
+
+def _quality_per_face(state: State, options: QualityOptions) -> dict[str, Any]:
+    mesh = state.mesh()
+    values = _METRICS[options.metric](mesh.points, mesh.quads)
+    state.meshes.give("set_scalar", values)
+    return {"min": float(values.min()), "max": float(values.max()), "avg": float(values.mean())}
+
+
+def _color_per_face(state: State, options: NoOptions) -> dict[str, Any]:
+    layer = state.meshes.layer()
+    materials = state.labels.materials if state.labels else None
+    if materials is None:
+        materials = state.mesh().materials
+    numbers = face_materials(layer, materials)
+    at = np.searchsorted(materials.labels, numbers).clip(max=len(materials.labels) - 1)
+    colors = np.concatenate([materials.colors[at], np.full((len(at), 1), 255, np.uint8)], axis=1)
+    state.meshes.give("set_color", colors)
+    return {"materials_number": len(np.unique(numbers))}
+
+
+def _measure_quality(state: State, options: NoOptions) -> dict[str, Any]:
+    return asdict(quality_report(state.mesh()))
+
+
+def _measure_materials(state: State, options: NoOptions) -> dict[str, Any]:
+    mesh = state.mesh()
+    areas, perimeters = material_areas(mesh), material_perimeters(mesh)
+    border, interface = boundary_lengths(mesh)
+    materials = {
+        mesh.materials.name_of(n): {
+            "number": n,
+            "quads_number": int(np.count_nonzero(mesh.quad_material == n)),
+            "regions_number": int(np.count_nonzero(mesh.region_label == n)),
+            "area": area,
+            "perimeter": perimeters[n],
+        }
+        for n, area in areas.items()
+    }
+    return {"materials": materials, "border_length": border, "interface_length": interface}
+
+
+def _list_sets(state: State, options: NoOptions) -> dict[str, Any]:
+    mesh = fe_mesh(state.mesh())
+    return {
+        "elements": {name: len(ids) for name, ids in mesh.material_cells().items()},
+        "nodes": {name: len(ids) for name, ids in mesh.node_sets.items()},
+        "sides": {name: len(ids) for name, ids in mesh.side_sets.items()},
+    }
+
+
+def _save_mesh(state: State, options: MeshFileOptions) -> dict[str, Any]:
+    path = script_path(options.file_name, state.folder)
+    check_target(path, mesh_extensions())
+    write_mesh_file(state.mesh(), path)
+    return {"file": str(path)}
+
+
+def _save_labels(state: State, options: LabelFileOptions) -> dict[str, Any]:
+    path = script_path(options.file_name, state.folder)
+    check_target(path, (".npy", ".png"))
+    write_labels(state.need_labels(), path)
+    return {"file": str(path)}
+
+
+def script_path(name: str, folder: Path) -> Path:
+    """Return the path of a file that a script names: inside the script's folder, or `InputError`."""
+    path = (folder / name).resolve()
+    if not name or not path.is_relative_to(folder.resolve()):
+        raise InputError(f"the file {name!r} is outside {folder.resolve()}, the script's folder; name one inside it")
+    return path
+
+
+class Step(NamedTuple):
+    """Options of a filter and what it does; the dictionary is what the filter returns."""
+
+    options: type[Any]
+    run: Callable[[State, Any], dict[str, Any]]
+
+
+#: by Python name, as in ``filters.xml``
+STEPS: Mapping[str, Step] = {
+    "compute_label_by_color_clustering_per_pixel": Step(SegmentationOptions, _segment),
+    "apply_label_noise_removal_per_pixel": Step(DenoiseOptions, _remove_noise),
+    "apply_label_crop_per_pixel": Step(CropOptions, _crop),
+    "delete_material_from_image": Step(DropOptions, _drop),
+    "generate_polyline_from_material_boundaries": Step(ExtractionOptions, _extract),
+    "apply_coord_material_boundary_smoothing": Step(SmoothingOptions, _smooth),
+    "generate_quad_mesh_from_material_boundaries": Step(MeshingOptions, _mesh_boundary),
+    "generate_quad_mesh_from_image": Step(MeshOptions, _mesh_image),
+    "compute_scalar_by_quad_quality_per_face": Step(QualityOptions, _quality_per_face),
+    "compute_color_by_material_per_face": Step(NoOptions, _color_per_face),
+    "get_quad_quality_measures": Step(NoOptions, _measure_quality),
+    "get_material_statistics": Step(NoOptions, _measure_materials),
+    "get_quad_mesh_sets": Step(NoOptions, _list_sets),
+    "export_quad_mesh_to_file": Step(MeshFileOptions, _save_mesh),
+    "export_label_image_to_file": Step(LabelFileOptions, _save_labels),
+}

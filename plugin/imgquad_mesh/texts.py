@@ -1,0 +1,113 @@
+"""Options that are not plain numbers, as the texts that scripts hold: the same texts as on the command line."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
+from typing import Any, NamedTuple, TypeVar
+
+from imgquad_core.errors import InputError
+
+from imgquad_mesh.cli import options as command
+from imgquad_mesh.spec import Filter, Value
+
+T = TypeVar("T")
+
+
+class Text(NamedTuple):
+    """How an option is read from a text and written as one."""
+
+    read: Callable[[str], Any]
+    write: Callable[[Any], str]
+
+
+def _items(text: str) -> list[str]:
+    """Split at commas; an item that holds one stands in double quotes."""
+    return [item for item in next(csv.reader([text], skipinitialspace=True), []) if item]
+
+
+def _joined(items: Iterable[str]) -> str:
+    out = io.StringIO()
+    csv.writer(out, lineterminator="").writerow(items)
+    return out.getvalue()
+
+
+def _write_colors(value: Any) -> str:
+    if isinstance(value, (str, int)):
+        return str(value)
+    return ",".join("#{:02x}{:02x}{:02x}".format(*map(int, color)) for color in value)
+
+
+def _sizes(text: str) -> dict[str, float]:
+    return dict(command.size_of(item) for item in _items(text))
+
+
+def _write_sizes(sizes: Mapping[Any, float] | None) -> str:
+    return _joined(f"{name}={size!r}" for name, size in (sizes or {}).items())
+
+
+def _whole_sizes(text: str) -> dict[int, float]:
+    return {int(command.number(name)): size for name, size in _sizes(text).items()}
+
+
+_LENGTH_OR_AUTO = Text(lambda text: None if text == "auto" else command.number(text), lambda v: "auto" if v is None else repr(v))
+
+#: by name of the field
+TEXTS: Mapping[str, Text] = {
+    "colors": Text(command.colors, _write_colors),
+    "min_pixels": Text(command.whole_or_auto, str),
+    "min_length": Text(command.real_or_auto, lambda v: v if isinstance(v, str) else repr(v)),
+    "boundary_size": _LENGTH_OR_AUTO,
+    "material_sizes": Text(_sizes, _write_sizes),
+    "drop": Text(lambda text: tuple(_items(text)), lambda names: _joined(map(str, names))),
+    "crop": Text(lambda text: command.box(text) if text else None, lambda box: ",".join(map(str, box)) if box else ""),
+}
+
+
+def options_from(kind: type[T], spec: Filter, values: Mapping[str, Any]) -> T:
+    """Make a filter's options.
+
+    Parameters
+    ----------
+    kind : type
+        Dataclass of the options.
+    spec : Filter
+        The filter.
+    values : mapping
+        Value of each parameter that is given, by field name.
+
+    Raises
+    ------
+    InputError
+        When a text cannot be read, or the options refuse a value.
+    """
+    given: dict[str, Any] = {}
+    for parameter in spec.parameters:
+        value = values.get(parameter.field, parameter.default)
+        given[parameter.field] = _read(parameter.name, parameter.field, value) if parameter.kind == "String" else value
+    return kind(**given)
+
+
+def _read(name: str, field: str, text: Value) -> Any:
+    if field not in TEXTS or not isinstance(text, str):
+        return text
+    try:
+        return TEXTS[field].read(text.strip())
+    except (argparse.ArgumentTypeError, ValueError) as error:
+        raise InputError(f"parameter {name} is {text!r}: {error}") from error
+
+
+def values_of(options: Any, spec: Filter) -> dict[str, Value]:
+    """Return the value of each parameter of a filter that options stand for, by field name: `options_from` turned round."""
+    values: dict[str, Value] = {}
+    for option in fields(options):
+        parameter = spec.parameter(option.name)
+        value = getattr(options, option.name)
+        if parameter is None:
+            raise InputError(f"filter {spec.name!r} has no parameter for the option {option.name}")
+        as_text = parameter.kind == "String" and option.name in TEXTS
+        values[option.name] = TEXTS[option.name].write(value) if as_text else value
+    return values
