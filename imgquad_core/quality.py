@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from .errors import QualityError
 from .halfedge import twins_of
 from .model import QuadMesh
 
@@ -215,6 +216,29 @@ def bad_places(mesh: QuadMesh, limit: float, most: int = 10) -> list[BadPlace]:
         )
         for q, centre in zip(worst, centres, strict=True)
     ]
+
+
+def require_quality(mesh: QuadMesh, limit: float, most: int = 5) -> None:
+    """Raise `QualityError` where a quad's scaled Jacobian is below `limit`.
+
+    The message says how many quads are, how many of them the picture forces, and names at most `most` of the worst.
+    """
+    below = scaled_jacobian(mesh.points, mesh.quads) < limit
+    if not below.any():
+        return
+    places = bad_places(mesh, limit, most)
+    forced = int(np.count_nonzero(below & forced_quads(mesh, limit)))
+    message = (
+        f"{np.count_nonzero(below)} of {mesh.n_quads} quads have a scaled Jacobian below {limit:g}, "
+        f"{forced} of them in sectors too narrow for more; lower the limit, or the size. The worst: "
+    )
+    raise QualityError(message + "; ".join(_told(mesh, place) for place in places), mesh, [p.quad for p in places])
+
+
+def _told(mesh: QuadMesh, place: BadPlace) -> str:
+    names = " | ".join(mesh.materials.name_of(m) for m in (place.material, *place.neighbours))
+    angle = f", sector of {place.sector_angle:.1f} degrees" if place.sector_angle < 360.0 - 1e-6 else ""
+    return f"{place.scaled_jacobian:.3f} at ({place.x:.6g}, {place.y:.6g}) in {names}{angle}"
 
 
 def _corners(points: Floats, quads: Ids) -> tuple[Floats, Floats, Floats]:

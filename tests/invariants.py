@@ -6,12 +6,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from imgquad_core.model import VOID, LabelImage, PointKind, QuadMesh
 from numpy.typing import NDArray
 from scipy.ndimage import label as connected
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+
+from imgquad_core.model import VOID, LabelImage, PointKind, QuadMesh
 
 Array = NDArray[Any]
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from imgquad_core import quality
 from imgquad_core.model import Materials, PointKind, QuadMesh
 

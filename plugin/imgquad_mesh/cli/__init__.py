@@ -1,0 +1,1 @@
+"""The command `imgquad-mesh`: one module a subcommand, each with `add_parser` and `execute`."""

@@ -1,0 +1,38 @@
+"""`imgquad-mesh demo`: draws a picture of a rock, meshes it, shows what comes out."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from imgquad_core.errors import InputError
+from imgquad_mesh.cli.run import Outputs, mesh_to_files
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    text = "Draw a thin section of rock, mesh it, write mesh, picture and report, print the report."
+    parser = subparsers.add_parser("demo", help="draw a rock and mesh it", description=text)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("imgquad-demo"), help="default: imgquad-demo")
+    parser.set_defaults(execute=execute)
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Write the demo into `args.folder`; return the exit code."""
+    from imgquad_core.pipeline import MeshOptions
+    from imgquad_mesh.drawing import rock_picture
+    from imgquad_mesh.files import replace_file
+
+    folder: Path = args.folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the folder {folder}: {error.strerror}; give another one") from error
+    picture = folder / "rock.png"
+    replace_file(picture, rock_picture().save)
+    outputs = Outputs(folder / "rock.vtu", report=folder / "rock.json", picture=folder / "mesh.png")
+    options = MeshOptions(size=5.0, min_pixels=12, min_length=6)
+    code = mesh_to_files(picture, options, outputs)
+    print(f"look at {picture} and {outputs.picture}; open {outputs.mesh} in ParaView or with pyvista.read")
+    return code

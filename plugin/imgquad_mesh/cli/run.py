@@ -1,0 +1,124 @@
+"""`imgquad-mesh run`: from a picture to the file of its mesh."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from imgquad_core.errors import InputError
+from imgquad_mesh.cli.options import add_mesh_options, mesh_options, number
+
+if TYPE_CHECKING:
+    from imgquad_core.pipeline import MeshOptions, Run
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser("run", help="mesh a picture", description="Mesh a picture.")
+    parser.add_argument("image", type=Path, metavar="IMAGE", help="PNG, JPEG, TIFF, BMP, PPM, PGM, NPY or VTI")
+    parser.add_argument("output", type=Path, metavar="OUTPUT", help="file of the mesh; its extension tells the format")
+    add_mesh_options(parser)
+    group = parser.add_argument_group("output")
+    group.add_argument("--labels-out", type=Path, metavar="FILE", help="materials as meshed: .npy or .png")
+    group.add_argument("--boundaries-out", type=Path, metavar="FILE", help="smoothed boundaries: .vtp")
+    group.add_argument("--report", type=Path, metavar="FILE", help="all figures: .json")
+    group.add_argument("--picture", type=Path, metavar="FILE", help="the mesh coloured by material: .png .svg .pdf")
+    group.add_argument("--min-quality", type=number, metavar="Q", help="code 3 if a quad's scaled Jacobian is below Q")
+    group.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.set_defaults(execute=execute)
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """The files that a run writes; `None` for those that were not asked for."""
+
+    mesh: Path
+    labels: Path | None = None
+    boundaries: Path | None = None
+    report: Path | None = None
+    picture: Path | None = None
+
+    def check(self) -> None:
+        """Raise `InputError` if one of them could not be written, before any work is done."""
+        from imgquad_mesh.files import check_target, mesh_extensions
+
+        allowed = {
+            "mesh": mesh_extensions(),
+            "labels": (".npy", ".png"),
+            "boundaries": (".vtp",),
+            "report": (".json",),
+            "picture": (".png", ".svg", ".pdf"),
+        }
+        targets = {name: path for name in allowed if (path := getattr(self, name)) is not None}
+        for name, path in targets.items():
+            check_target(path, allowed[name])
+        if len({path.absolute() for path in targets.values()}) < len(targets):
+            raise InputError(f"two outputs have one name: {', '.join(map(str, targets.values()))}")
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Mesh the picture that `args` names; return the exit code."""
+    outputs = Outputs(args.output, args.labels_out, args.boundaries_out, args.report, args.picture)
+    return mesh_to_files(args.image, mesh_options(args), outputs, quiet=args.quiet, min_quality=args.min_quality)
+
+
+def mesh_to_files(
+    image: Path, options: MeshOptions, outputs: Outputs, *, quiet: bool = False, min_quality: float | None = None
+) -> int:
+    """Mesh a picture, write what is asked for, print the report; return the exit code.
+
+    Raises
+    ------
+    InputError
+        The picture cannot be used or a file cannot be written.
+    QualityError
+        A quad is below `min_quality`; all files are written.
+    """
+    from imgquad_core.quality import require_quality
+    from imgquad_mesh.cli.console import print_report, progress_bar_if
+    from imgquad_mesh.files import write_json
+    from imgquad_mesh.report import build_report
+
+    start = perf_counter()
+    outputs.check()
+    with progress_bar_if(not quiet) as progress:
+        run = _run(image, options, progress)
+        wrote = perf_counter()
+        progress("write", len(run.seconds), len(run.seconds) + 1)
+        _write(run, outputs)
+    now = perf_counter()
+    seconds = {**run.seconds, "write": now - wrote, "total": now - start}
+    report = build_report(run, image, outputs.mesh, seconds, min_quality)
+    if outputs.report:
+        write_json(report, outputs.report)
+    if not quiet:
+        print_report(report)
+    if min_quality is not None:
+        require_quality(run.mesh, min_quality)
+    return 0
+
+
+def _run(image: Path, options: MeshOptions, progress: Callable[[str, int, int], None]) -> Run:
+    from imgquad_core.pipeline import run
+
+    if image.suffix.lower() != ".vti":
+        return run(image, options, progress)
+    from imgquad_mesh.files import read_vti
+
+    return run(read_vti(image, options.max_pixels), options, progress)
+
+
+def _write(run: Run, outputs: Outputs) -> None:
+    from imgquad_mesh import files
+
+    if outputs.labels:
+        files.write_labels(run.labels, outputs.labels)
+    if outputs.boundaries:
+        files.write_boundaries(run, outputs.boundaries)
+    if outputs.picture:
+        files.write_picture(run.mesh, outputs.picture)
+    files.write_mesh_file(run.mesh, outputs.mesh)

@@ -1,0 +1,62 @@
+"""Pictures of a mesh, drawn by matplotlib without a screen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from imgquad_core.model import Materials, QuadMesh
+
+PIXELS = 1600  #: of the longer side
+DISTINCT = 40  #: least difference between the colours of two materials, in one channel
+
+
+def draw_materials(mesh: QuadMesh, path: Path) -> None:
+    """Draw the mesh coloured by material, with its edges where they are wide enough to be seen, and a legend."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    width, height = high - low
+    longest = max(width, height)
+    figure = Figure(figsize=(16 * width / longest + 2.4, max(16 * height / longest, 1.0)), dpi=PIXELS / 16)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 16 * width / longest / figure.get_figwidth(), 1))
+    colors = material_colors(mesh.materials)
+    used = np.unique(mesh.quad_material)
+    faces = colors[np.searchsorted(mesh.materials.labels, mesh.quad_material)]
+    edge = np.sqrt(width * height / mesh.n_quads) / longest * PIXELS  # length of an edge in the picture's pixels
+    line = float(np.clip(edge / 20, 0.0, 0.8)) if edge > 3 else 0.0
+    drawn = PolyCollection(list(mesh.points[mesh.quads]), facecolors=faces, edgecolors="black", linewidths=line)
+    drawn.set_antialiased(line > 0)
+    axes.add_collection(drawn)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axes.set_axis_off()
+    keys = [Patch(facecolor=colors[np.searchsorted(mesh.materials.labels, m)], edgecolor="black") for m in used[:24]]
+    names = [mesh.materials.name_of(int(m)) for m in used[:24]]
+    figure.legend(keys, names, loc="center right", frameon=False, fontsize=11)
+    figure.savefig(path, format=path.suffix.lstrip(".").lower() or "png", facecolor="white", metadata=_undated(path))
+
+
+def material_colors(materials: Materials) -> NDArray[np.float64]:
+    """Return RGB from 0 to 1 of each material: the picture's own where they can be told apart, else others."""
+    from matplotlib import colormaps
+
+    own = materials.colors.astype(int)
+    difference = np.abs(own[:, None] - own[None]).max(axis=2)
+    np.fill_diagonal(difference, 255)
+    if difference.min(initial=255) >= DISTINCT:
+        return own / 255
+    table = colormaps["tab20" if len(own) > 10 else "tab10"]
+    return np.array([table(i % table.N)[:3] for i in range(len(own))])
+
+
+def _undated(path: Path) -> dict[str, Any]:
+    """Return metadata without a date, so that the same mesh gives the same bytes."""
+    return {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(path.suffix.lower(), {})
