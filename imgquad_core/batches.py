@@ -1,0 +1,95 @@
+"""Work on many faces in batches: small enough for the cache, independent, so that threads can share them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .jit import kernel
+from .splitting import FaceQuads
+
+Ids = NDArray[np.int64]
+Points = NDArray[np.float64]
+Result = TypeVar("Result")
+
+BATCH = 3000  # quads, so that a batch stays in the cache
+TILE = 8  # edge lengths; quads of a batch are numbered tile by tile
+
+
+def in_batches(mesh: FaceQuads, work: Callable[[FaceQuads], Result], threads: int) -> list[Result]:
+    """Call `work` for groups of whole faces; the results come in the order of the batches, whatever the threads."""
+    parts = _batches(mesh)
+    if threads == 1 or len(parts) == 1:
+        return [work(part) for part in parts]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, parts))
+
+
+def _batches(mesh: FaceQuads) -> list[FaceQuads]:
+    """Cut the mesh into groups of neighbouring faces (by number) of about `BATCH` quads."""
+    per_face = np.bincount(mesh.face)
+    batch_of_face = (np.cumsum(per_face) - per_face) // BATCH
+    batch = batch_of_face[mesh.face]
+    order = np.lexsort((_tile(mesh), mesh.face, batch))
+    ends = np.flatnonzero(np.diff(batch[order])) + 1
+    return [_part(mesh, chosen) for chosen in np.split(order, ends)]
+
+
+def _tile(mesh: FaceQuads) -> Ids:
+    """Number of the tile that holds the first corner of each quad."""
+    corner = mesh.points[mesh.quads[:, 0]]
+    area = np.ptp(mesh.points, axis=0).prod() / max(1, len(mesh.quads))
+    cell = np.floor(corner / (TILE * np.sqrt(area) + 1e-300)).astype(np.int64)
+    return cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0]
+
+
+def _part(mesh: FaceQuads, quads: Ids) -> FaceQuads:
+    """Take some quads out, with their points numbered by first use."""
+    local, ids = _renumber(mesh.quads[quads], len(mesh.points))
+    return FaceQuads(mesh.points[ids], local, mesh.face[quads], mesh.origin[ids], mesh.wanted[ids])
+
+
+@kernel
+def _renumber(quads: Ids, n_points: int) -> tuple[Ids, Ids]:
+    """Number the points of `quads` by first use; return the quads in new ids and the old id of each."""
+    new = np.full(n_points, -1, np.int64)
+    ids = np.empty(quads.size, np.int64)
+    local = np.empty_like(quads)
+    n = 0
+    for q in range(len(quads)):
+        for k in range(4):
+            v = quads[q, k]
+            if new[v] < 0:
+                new[v] = n
+                ids[n] = v
+                n += 1
+            local[q, k] = new[v]
+    return local, ids[:n].copy()
+
+
+def joined(parts: list[FaceQuads]) -> FaceQuads:
+    """Put meshes that share no points into one."""
+    shift = np.cumsum([0] + [len(part.points) for part in parts])
+    return FaceQuads(
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([part.quads + s for part, s in zip(parts, shift, strict=False)]),
+        np.concatenate([part.face for part in parts]),
+        np.concatenate([part.origin for part in parts]),
+        np.concatenate([part.wanted for part in parts]),
+    )
+
+
+def faces_only(mesh: FaceQuads, faces: NDArray[np.bool_]) -> FaceQuads:
+    """Keep the quads of the flagged faces."""
+    keep = np.flatnonzero(faces[mesh.face])
+    return mesh if len(keep) == len(mesh.face) else _part(mesh, keep)
+
+
+def no_quads() -> FaceQuads:
+    """Return an empty mesh."""
+    none = np.empty(0, np.int64)
+    return FaceQuads(np.empty((0, 2)), np.empty((0, 4), np.int64), none, none, none)

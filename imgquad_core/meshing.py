@@ -1,0 +1,333 @@
+"""From boundaries to quads: the paper's step 4, face by face on two levels.
+
+Every face (region) is meshed alone; faces meet in the points of the boundary, so they fit whatever their level. A
+wide face is meshed and cleaned up two levels coarser than its final edges (an irregular node stays one node while
+nodes become sixteen times as many), others one level coarser. A face whose worst element is poor is meshed again one
+level finer, and the better mesh is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .batches import faces_only, in_batches, joined, no_quads
+from .composing import compose
+from .crossfield import cross_field
+from .cutting import CutMesh, FaceConflict, cut_at_constraints
+from .errors import InputError, TopologyError
+from .frontal import frontal_points
+from .halfedge import twins_of
+from .model import BoundaryGraph, Materials, PointKind, QuadMesh
+from .outline import Flags, Outline, chains_of, coarse_segments, halved, outline, wide_faces
+from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, untangle, worst_of_faces
+from .splitting import FaceQuads, middles_of, split_composed, split_quads
+from .topology import CleanUp, clean_up
+from .triangulation import Triangles, constraint_table, triangulate
+
+Ids = NDArray[np.int64]
+Points = NDArray[np.float64]
+
+STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
+LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
+BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
+FIT_ROUNDS = 6
+REFITS = 12  # rounds in which boundary points that fold a quad go back to the chord
+
+
+class Effort(NamedTuple):
+    """How far a mesh is optimised."""
+
+    wide: CleanUp  #: clean-up of faces on level 2
+    narrow: CleanUp  #: clean-up of faces on level 1
+    again_below: float  #: a face on level 2 with a worse element is meshed on level 1 as well
+
+
+EFFORTS: Mapping[str, Effort] = {
+    "fast": Effort(CleanUp((16, 40), 0.2, 0.6), CleanUp((16,), 0.2, 0.6), 0.4),
+    "normal": Effort(CleanUp((40, 160), 0.2, 0.6), CleanUp((16, 40, 80), 0.2, 0.6), 0.5),
+    "best": Effort(CleanUp((16, 40, 80, 160), 0.4, 0.6), CleanUp((16, 40, 80, 160), 0.4, 0.6), 0.6),
+}
+
+
+@dataclass(frozen=True)
+class MeshingOptions:
+    """How boundaries are filled with quads.
+
+    Parameters
+    ----------
+    size : float
+        Length of final edges inside, in pixels.
+    growth : float
+        Largest ratio of the sizes of neighbouring elements (above 1.35 it counts as 1.35 inside faces).
+    material_sizes : mapping of int to float
+        Length of final edges per material label.
+    effort : {"fast", "normal", "best"}
+        How far irregular nodes are hunted.
+    threads : int
+        Number of threads; the mesh does not depend on it.
+    """
+
+    size: float = 4.0
+    growth: float = 1.3
+    material_sizes: Mapping[int, float] | None = field(default=None)
+    effort: str = "normal"
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name, value in {"size": self.size, **{f"size of material {k}": v for k, v in self._sizes().items()}}.items():
+            if not 0.05 <= value < float("inf"):
+                raise InputError(f"{name} is {value}; give a length of at least 0.05 px")
+        if not 1.01 <= self.growth <= 10.0:
+            raise InputError(f"growth is {self.growth}; give a ratio from 1.01 to 10")
+        if self.effort not in EFFORTS:
+            raise InputError(f"effort is {self.effort!r}; give one of {', '.join(EFFORTS)}")
+        if self.threads < 1:
+            raise InputError(f"threads is {self.threads}; give at least 1")
+
+    def _sizes(self) -> Mapping[int, float]:
+        return self.material_sizes or {}
+
+    @property
+    def slope(self) -> float:
+        """Growth of the edge length per unit of length inside faces."""
+        return min(self.growth - 1.0, STEEPEST)
+
+    def face_sizes(self, labels: NDArray[np.int32]) -> Points:
+        """Return the edge length asked for in each face."""
+        sizes = np.full(len(labels), self.size)
+        for label, size in self._sizes().items():
+            sizes[labels == label] = size
+        return sizes
+
+
+class _Conflict(Exception):
+    """Outlines of these regions contradict each other at this stride."""
+
+    def __init__(self, regions: Ids) -> None:
+        super().__init__(f"regions {regions[:10].tolist()}")
+        self.regions = regions
+
+
+def mesh_boundaries(
+    graph: BoundaryGraph, options: MeshingOptions | None = None, materials: Materials | None = None
+) -> QuadMesh:
+    """Fill the regions between boundaries with quadrilaterals.
+
+    Parameters
+    ----------
+    graph : BoundaryGraph
+        From `smooth_boundaries`: chains of final edges, an even number each.
+    options : MeshingOptions, optional
+        Sizes, effort, threads.
+    materials : Materials, optional
+        Carried to the mesh; by default made of the labels.
+
+    Returns
+    -------
+    QuadMesh
+        Convex, counter-clockwise quads; every point of `graph` is a point of the mesh with the same id.
+
+    Raises
+    ------
+    TopologyError
+        If the chains cross.
+    """
+    options = options or MeshingOptions()
+    graph = _consistent(graph)
+    for _ in range(REFITS):
+        parts, stuck = _mesh_faces(graph, options)
+        if len(stuck) == 0:
+            return _stitch(graph, parts, materials or _materials_of(graph.region_label))
+        graph = _on_chords(graph, stuck)
+    raise TopologyError(f"{len(stuck)} boundary points fold quads, the first at {graph.points[stuck[0]].tolist()}")
+
+
+def _consistent(graph: BoundaryGraph) -> BoundaryGraph:
+    """Return the graph, with finer chains where the coarse outlines contradict each other."""
+    for _ in range(3):
+        chords = coarse_segments(graph, np.ones(graph.n_chains, bool), 2)
+        pairs = np.sort(np.stack([chords.tail, chords.head], axis=1), axis=1)
+        _, which, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+        double = count[which.ravel()] > 1
+        bad = np.zeros(graph.n_chains, bool)
+        bad[chords.chain[double]] = True
+        if not bad.any():
+            try:
+                everything = np.ones(len(graph.region_label), bool)
+                flat = outline(graph, everything, 2)
+                cut = cut_at_constraints(triangulate(flat.points, flat.segments), flat.constraints)
+            except TopologyError:
+                bad[:] = True
+            else:
+                if not isinstance(cut, FaceConflict):
+                    return graph
+                faces = np.zeros(len(graph.region_label), bool)
+                faces[cut.regions] = True
+                bad = chains_of(graph, faces)
+        graph = halved(graph, bad)
+    raise TopologyError("the boundaries of the regions cross or contradict each other")
+
+
+def _mesh_faces(graph: BoundaryGraph, options: MeshingOptions) -> tuple[list[FaceQuads], Ids]:
+    """Mesh all faces on their levels; return their quads and the boundary points that could not be met."""
+    effort = EFFORTS[options.effort]
+    wide = wide_faces(graph, LEAST_WIDTH)
+    coarse = _mesh_wide(graph, wide, effort.wide, options)
+    fine = _mesh_level(graph, ~wide | (coarse.worst < effort.again_below), 2, effort.narrow, options)
+    better = fine.meshed & ~(wide & (coarse.worst >= fine.worst))
+    stuck = fine.late[_bounds_any(graph, fine.late, better)]
+    return [faces_only(coarse.quads, ~better), faces_only(fine.quads, better)], stuck
+
+
+class _Level(NamedTuple):
+    """Some faces meshed with one stride."""
+
+    quads: FaceQuads
+    meshed: Flags  # which faces
+    worst: Points  # scaled Jacobian of each face, -1 where a boundary point could not be met
+    late: Ids  # boundary points that could not be met
+
+
+def _mesh_wide(graph: BoundaryGraph, wide: Flags, how: CleanUp, options: MeshingOptions) -> _Level:
+    """Mesh faces with stride 4, without those whose chords contradict each other (`wide` is updated)."""
+    while True:
+        try:
+            level = _mesh_level(graph, wide, 4, how, options)
+        except _Conflict as conflict:
+            wide[conflict.regions] = False
+        else:
+            level.worst[_faces_at(graph, level.late)] = -1.0
+            return level
+
+
+def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> _Level:
+    """Mesh the flagged faces from segments of `stride` edges."""
+    if not faces.any():
+        return _Level(no_quads(), faces, np.full(len(faces), -1.0), np.empty(0, np.int64))
+    composed = _compose(graph, faces, stride, options)
+    edges = coarse_segments(graph, chains_of(graph, faces), 2)
+    nothing = np.zeros(len(edges.tail), np.int64)
+    middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)
+
+    def finish(part: FaceQuads) -> tuple[FaceQuads, Ids]:
+        part, late = _fitted(part, graph.points)
+        part = clean_up(_relaxed(part, 3, 0), how)
+        if stride == 4:
+            part = _relaxed(part, 3, 0)
+            twins = twins_of(part.quads, len(part.points))
+            part = split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
+            part, later = _fitted(part, graph.points)
+            late = np.concatenate([late, later])
+        return _relaxed(part, 8, 6), late
+
+    done = in_batches(composed, finish, options.threads)
+    quads = joined([part for part, _ in done])
+    worst = worst_of_faces(quads.points, quads.quads, quads.face, len(faces))
+    return _Level(quads, faces, worst, np.unique(np.concatenate([late for _, late in done])))
+
+
+def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
+    """Triangulate faces, place points in layers, compose the triangles and split all to quads."""
+    sizes = options.face_sizes(graph.region_label) * stride
+    flat = outline(graph, faces, stride)
+    cut = _cut(triangulate(flat.points, flat.segments, BACKGROUND_AREA * float(sizes[faces].max()) ** 2), flat)
+    field = cross_field(cut, _largest_sizes(cut, sizes), options.slope)
+    points = np.vstack([flat.points, frontal_points(cut, field)])
+    cut = _cut(triangulate(points, flat.segments), flat)
+    quads = split_composed(cut, compose(cut), len(flat.ids))
+    n = len(cut.points)
+    origin = quads.origin.copy()
+    origin[:n] = np.where(origin[:n] >= 0, flat.ids[np.maximum(origin[:n], 0)], -1)
+    return quads._replace(origin=origin)
+
+
+def _cut(mesh: Triangles, flat: Outline) -> CutMesh:
+    cut = cut_at_constraints(mesh, flat.constraints)
+    if isinstance(cut, FaceConflict):
+        raise _Conflict(cut.regions)
+    return cut
+
+
+def _largest_sizes(cut: CutMesh, sizes: Points) -> Points:
+    """Return the size asked for at each point of a cut mesh."""
+    face = np.zeros(len(cut.points), np.int64)
+    face[cut.triangles] = cut.face[:, None]
+    return sizes[face]
+
+
+def _fitted(part: FaceQuads, targets: Points) -> tuple[FaceQuads, Ids]:
+    """Move the rim to the boundary's points; return also those points that could not be met."""
+    rim = part.origin >= 0
+    points = part.points.copy()
+    late = fit_rim(points, rings_of(part.quads, len(points)), rim, targets[part.origin], FIT_ROUNDS)
+    return part._replace(points=points), part.origin[late]
+
+
+def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int) -> FaceQuads:
+    """Smooth the nodes inside faces."""
+    points, free = part.points.copy(), part.origin < 0
+    rings = rings_of(part.quads, len(points))
+    laplace(points, rings, free, laplace_sweeps)
+    untangle(points, rings, free, 2, BAD)
+    newton(points, rings, free, newton_sweeps, GOOD)
+    return part._replace(points=points)
+
+
+def _faces_at(graph: BoundaryGraph, points: Ids) -> Flags:
+    """Return which faces have one of these boundary points on their outline."""
+    hit = np.zeros(len(graph.points), bool)
+    hit[points] = True
+    chain = np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets))
+    faces = np.zeros(len(graph.region_label) + 1, bool)
+    faces[graph.chain_regions[chain[hit[graph.chain_points]]]] = True
+    return faces[:-1]
+
+
+def _bounds_any(graph: BoundaryGraph, points: Ids, faces: Flags) -> Flags:
+    """Return for each point whether its chain bounds a flagged face (points inside chains only)."""
+    chain_of = np.zeros(len(graph.points), np.int64)
+    chain_of[graph.chain_points] = np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets))
+    return chains_of(graph, faces)[chain_of[points]]
+
+
+def _on_chords(graph: BoundaryGraph, points: Ids) -> BoundaryGraph:
+    """Return the graph with these odd-place points half-way between their neighbours on the chain."""
+    moved = graph.points.copy()
+    hit = np.zeros(len(moved), bool)
+    hit[points] = True
+    at = np.flatnonzero(hit[graph.chain_points])
+    ids = graph.chain_points
+    moved[ids[at]] = 0.5 * (graph.points[ids[at - 1]] + graph.points[ids[at + 1]])
+    return replace(graph, points=moved)
+
+
+def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
+    """Join faces at the boundary's points."""
+    quads = joined(parts)
+    inner = quads.origin < 0
+    ids = quads.origin.copy()
+    ids[inner] = len(graph.points) + np.arange(inner.sum())
+    points = np.vstack([graph.points, quads.points[inner]])
+    kind = np.concatenate([graph.point_kind, np.full(inner.sum(), PointKind.INTERIOR, np.uint8)])
+    return QuadMesh(
+        points,
+        kind,
+        ids[quads.quads],
+        quads.face,
+        graph.region_label,
+        graph.chain_offsets,
+        graph.chain_points,
+        graph.chain_regions,
+        materials,
+    )
+
+
+def _materials_of(labels: NDArray[np.int32]) -> Materials:
+    present = np.unique(labels)
+    shade = np.linspace(0, 255, len(present)).astype(np.uint8)
+    return Materials(present, tuple(f"material {m}" for m in present), np.repeat(shade[:, None], 3, axis=1))

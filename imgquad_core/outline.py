@@ -1,0 +1,153 @@
+"""The outlines of the faces that are meshed together: every second or fourth point of the boundary chains.
+
+A face is meshed one or two levels coarser than its final edges and split once or twice at the end:
+
+    stride 4:  o-----------o       level 2: the split gives + first, then .
+    stride 2:  o-----+-----o       level 1: the split gives .
+    final:     o--.--+--.--o
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .clearance import find_conflicts
+from .model import VOID, BoundaryGraph
+from .triangulation import Constraints, constraint_table
+
+Ids = NDArray[np.int64]
+Points = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class Segments(NamedTuple):
+    """Coarse segments of some chains, in ids of the boundary graph."""
+
+    tail: Ids
+    head: Ids
+    middle: Ids  #: the point of the graph half-way between
+    chain: Ids
+
+
+class Outline(NamedTuple):
+    """What is triangulated."""
+
+    points: Points  #: points used, in the order of their ids in the graph
+    ids: Ids  #: their ids in the graph
+    segments: Ids  #: (m, 2), places in `points`
+    constraints: Constraints
+
+
+def coarse_segments(graph: BoundaryGraph, chains: Flags, stride: int) -> Segments:
+    """Return the segments over `stride` edges each of the flagged chains, whose edges must be a multiple of it."""
+    chosen = np.flatnonzero(chains)
+    counts = (np.diff(graph.chain_offsets)[chosen] - 1) // stride
+    chain = np.repeat(chosen, counts)
+    nth = np.arange(len(chain)) - np.repeat(np.cumsum(counts) - counts, counts)
+    place = graph.chain_offsets[chain] + stride * nth
+    ids = graph.chain_points
+    return Segments(ids[place], ids[place + stride], ids[place + stride // 2], chain)
+
+
+def chains_of(graph: BoundaryGraph, faces: Flags) -> Flags:
+    """Return which chains bound a flagged face (region)."""
+    padded = np.append(faces, False)  # VOID is the last entry
+    return padded[graph.chain_regions].any(axis=1)
+
+
+def outline(graph: BoundaryGraph, faces: Flags, stride: int) -> Outline:
+    """Return the outline of the flagged faces."""
+    segments = coarse_segments(graph, chains_of(graph, faces), stride)
+    ids = np.unique(np.concatenate([segments.tail, segments.head]))
+    tail, head = np.searchsorted(ids, segments.tail), np.searchsorted(ids, segments.head)
+    regions = np.where(np.append(faces, False)[graph.chain_regions], graph.chain_regions, VOID)[segments.chain]
+    table = constraint_table(len(ids), tail, head, regions[:, 0], regions[:, 1], segments.middle)
+    return Outline(graph.points[ids], ids, np.stack([tail, head], axis=1), table)
+
+
+def wide_faces(graph: BoundaryGraph, least_width: float) -> Flags:
+    """Return which faces can be meshed at stride 4: edges divisible by 4, no conflict of chords, wide enough.
+
+    The width of a face is four times its area over its outline, in lengths of its stride-4 segments.
+    """
+    n_regions = len(graph.region_label)
+    edges = np.diff(graph.chain_offsets) - 1
+    fits = edges % 4 == 0
+    segments = coarse_segments(graph, fits, 4)
+    length = np.hypot(*(graph.points[segments.head] - graph.points[segments.tail]).T)
+    fits &= ~_chains_in_conflict(graph, segments, length)
+    wide = _width(graph, segments, length) >= least_width
+    for side in (0, 1):
+        at = graph.chain_regions[:, side]
+        wide[at[(at >= 0) & ~fits]] = False
+    return wide & (_loop_segments(graph, n_regions) >= 4)
+
+
+def _chains_in_conflict(graph: BoundaryGraph, segments: Segments, length: Points) -> Flags:
+    """Return which chains have chords that cross or crowd others, or that join the same points as another chord."""
+    bad = np.zeros(graph.n_chains, bool)
+    pairs = np.stack([segments.tail, segments.head], axis=1)
+    marks = find_conflicts(graph.points, pairs, segments.chain, np.ones(graph.n_chains, bool), graph.shape)
+    bad[segments.chain[marks > 0]] = True
+    pairs = np.sort(pairs, axis=1)
+    _, first, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    bad[segments.chain[count[first.ravel()] > 1]] = True
+    bad[segments.chain[length == 0.0]] = True
+    return bad
+
+
+def _width(graph: BoundaryGraph, segments: Segments, length: Points) -> Points:
+    """Return the width of each face in lengths of its segments."""
+    around = np.zeros(len(graph.region_label) + 1)
+    count = np.zeros(len(graph.region_label) + 1)
+    per_chain = np.bincount(segments.chain, length, graph.n_chains)
+    n_per_chain = np.bincount(segments.chain, minlength=graph.n_chains)
+    for side in (0, 1):
+        np.add.at(around, graph.chain_regions[:, side], per_chain)
+        np.add.at(count, graph.chain_regions[:, side], n_per_chain)
+    edge = around[:-1] / np.maximum(count[:-1], 1)
+    return 4.0 * graph.region_pixels / np.maximum(around[:-1] * edge, 1e-9)
+
+
+def _loop_segments(graph: BoundaryGraph, n_regions: int) -> Ids:
+    """Return the number of stride-4 segments around each face."""
+    count = np.zeros(n_regions + 1, np.int64)
+    per_chain = (np.diff(graph.chain_offsets) - 1) // 4
+    for side in (0, 1):
+        np.add.at(count, graph.chain_regions[:, side], per_chain)
+    return count[:-1]
+
+
+def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
+    """Return the graph with a mid-point on every edge of the flagged chains."""
+    offsets, ids = graph.chain_offsets, graph.chain_points
+    counts = np.diff(offsets)
+    n = len(graph.points)
+    chain = np.repeat(np.arange(graph.n_chains), counts)
+    split = chains[chain].copy()
+    split[offsets[1:] - 1] = False  # no edge behind the last point of a chain
+    at = np.flatnonzero(split)
+    new = n + np.arange(len(at))
+    points = np.vstack([graph.points, 0.5 * (graph.points[ids[at]] + graph.points[ids[at + 1]])])
+    straight = np.isin(graph.chain_regions, VOID).any(axis=1)[chain[at]]
+    kind = np.where(straight & _on_frame(points[n:], graph.shape), 2, 0)
+    new_counts = counts + np.bincount(chain[at], minlength=graph.n_chains)
+    return BoundaryGraph(
+        points,
+        np.concatenate([graph.point_kind, kind]),
+        np.concatenate([[0], np.cumsum(new_counts)]),
+        np.insert(ids, at + 1, new),
+        graph.chain_regions,
+        graph.region_label,
+        graph.region_pixels,
+        graph.shape,
+    )
+
+
+def _on_frame(points: Points, shape: tuple[int, int]) -> Flags:
+    rows, cols = shape
+    x, y = points.T
+    return (x == 0) | (x == cols) | (y == 0) | (y == rows)

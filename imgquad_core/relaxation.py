@@ -1,0 +1,300 @@
+"""Move nodes for better shape; connectivity stays. No move ever inverts a quad.
+
+Three ways, each for what it does best: Laplace on an active set (cheap, most of the way), Newton's method on the
+inverse mean ratio where a ring is not good yet (tails), a pattern search on the worst scaled Jacobian where a ring is
+bad (also turns inverted quads back).
+
+Reference: P. M. Knupp, Algebraic mesh quality metrics, SISC 23 (2001), https://doi.org/10.1137/S1064827500371499
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .halfedge import corners_at
+from .jit import kernel
+
+Ids = NDArray[np.int64]
+Points = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+GUARD = 0.6  # a Laplace move may lower a ring's worst scaled Jacobian down to this, not further
+TOLERANCE = 0.01  # of the edge length: smaller moves stop the activity of a node
+GOOD = 0.9  # Newton works on rings with a quad below this
+BAD = 0.35  # the pattern search works on rings below this
+POWER = 4  # of the inverse mean ratio in Newton's energy
+HALVINGS = 6
+
+
+class Rings(NamedTuple):
+    """Quads and, for each node, the corners ``4 q + k`` that it has."""
+
+    quads: Ids
+    offsets: Ids
+    corners: Ids
+
+
+def rings_of(quads: Ids, n_points: int) -> Rings:
+    """Return the rings of the nodes of `quads`."""
+    offsets, corners = corners_at(quads, n_points)
+    return Rings(quads, offsets, corners)
+
+
+@kernel
+def corner_sine(points: Points, quads: Ids, q: int, k: int) -> float:
+    """Sine of the angle at corner k of quad q (negative where it is reflex)."""
+    v, a, b = quads[q, k], quads[q, (k + 1) & 3], quads[q, (k + 3) & 3]
+    ax, ay = points[a, 0] - points[v, 0], points[a, 1] - points[v, 1]
+    bx, by = points[b, 0] - points[v, 0], points[b, 1] - points[v, 1]
+    return (ax * by - ay * bx) / (np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by)) + 1e-300)
+
+
+@kernel
+def quad_quality(points: Points, quads: Ids, q: int) -> float:
+    """Scaled Jacobian of quad q: the least of its corner sines."""
+    return min(
+        min(corner_sine(points, quads, q, 0), corner_sine(points, quads, q, 1)),
+        min(corner_sine(points, quads, q, 2), corner_sine(points, quads, q, 3)),
+    )
+
+
+@kernel
+def ring_quality(points: Points, rings: Rings, v: int) -> float:
+    """Worst scaled Jacobian of the quads around node v."""
+    worst = 1.0
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        worst = min(worst, quad_quality(points, rings.quads, rings.corners[i] >> 2))
+    return worst
+
+
+@kernel
+def _activate_ring(active: Flags, rings: Rings, v: int) -> None:
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        for k in range(4):
+            active[rings.quads[rings.corners[i] >> 2, k]] = True
+
+
+@kernel
+def laplace(points: Points, rings: Rings, free: Flags, sweeps: int) -> None:
+    """Move free nodes to the mean of their edge neighbours, in place, while anything moves (at most `sweeps` times)."""
+    active = free.copy()
+    for _ in range(sweeps):
+        moved = False
+        for v in range(len(points)):
+            n = rings.offsets[v + 1] - rings.offsets[v]
+            if not (active[v] and free[v]) or n == 0:
+                continue
+            active[v] = False
+            x, y, reach = 0.0, 0.0, 0.0
+            old_x, old_y = points[v, 0], points[v, 1]
+            for i in range(rings.offsets[v], rings.offsets[v + 1]):
+                c = rings.corners[i]
+                w = rings.quads[c >> 2, (c + 1) & 3]
+                x += points[w, 0]
+                y += points[w, 1]
+                reach += abs(points[w, 0] - old_x) + abs(points[w, 1] - old_y)
+            x, y = x / n, y / n
+            if abs(x - old_x) + abs(y - old_y) < TOLERANCE * reach / n:
+                continue
+            before = ring_quality(points, rings, v)
+            points[v, 0], points[v, 1] = x, y
+            after = ring_quality(points, rings, v)
+            if after < GUARD and after < before:
+                points[v, 0], points[v, 1] = old_x, old_y
+                continue
+            _activate_ring(active, rings, v)
+            moved = True
+        if not moved:
+            break
+
+
+@kernel
+def _corner_energy(
+    px: float, py: float, nx: float, ny: float, bx: float, by: float, which: int
+) -> tuple[float, float, float, float, float, float]:
+    """Energy f^POWER of one corner, f = (|a|^2 + |b|^2) / 2 det, with its derivatives by one of its three points.
+
+    The corner is at p, a runs to n(ext), b to (previous) b; `which` is 0 for p, 1 for n, 2 for b.
+    Returns (energy, gx, gy, hxx, hxy, hyy); energy is inf where the corner is folded.
+    """
+    ax, ay, cx, cy = nx - px, ny - py, bx - px, by - py
+    det = ax * cy - ay * cx
+    if det <= 0.0:
+        return np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
+    f = (ax * ax + ay * ay + cx * cx + cy * cy) / (2.0 * det)
+    if which == 0:
+        sx, sy, dx, dy, h = -(ax + cx), -(ay + cy), ay - cy, cx - ax, 2.0
+    elif which == 1:
+        sx, sy, dx, dy, h = ax, ay, cy, -cx, 1.0
+    else:
+        sx, sy, dx, dy, h = cx, cy, -ay, ax, 1.0
+    fx, fy = (sx - f * dx) / det, (sy - f * dy) / det
+    fxx = (h - 2.0 * fx * dx) / det
+    fyy = (h - 2.0 * fy * dy) / det
+    fxy = -(fx * dy + fy * dx) / det
+    f2 = f * f  # POWER == 4
+    first, second = 4.0 * f2 * f, 12.0 * f2
+    return (
+        f2 * f2,
+        first * fx,
+        first * fy,
+        second * fx * fx + first * fxx,
+        second * fx * fy + first * fxy,
+        second * fy * fy + first * fyy,
+    )
+
+
+@kernel
+def _ring_energy(points: Points, rings: Rings, v: int, out: Points) -> None:
+    """Sum energy and derivatives of the three corners of each ring quad that node v is part of, into `out` (6,)."""
+    out[:] = 0.0
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        c = rings.corners[i]
+        q, k = c >> 2, c & 3
+        for which in range(3):
+            # v is the corner itself, or what the corner before it runs to, or what the corner after it comes from
+            at = (k + (0, 3, 1)[which]) & 3
+            p, n, b = rings.quads[q, at], rings.quads[q, (at + 1) & 3], rings.quads[q, (at + 3) & 3]
+            e, gx, gy, hxx, hxy, hyy = _corner_energy(
+                points[p, 0], points[p, 1], points[n, 0], points[n, 1], points[b, 0], points[b, 1], which
+            )
+            out[0] += e
+            out[1] += gx
+            out[2] += gy
+            out[3] += hxx
+            out[4] += hxy
+            out[5] += hyy
+
+
+@kernel
+def _newton_step(out: Points) -> tuple[float, float]:
+    """Descent step from energy derivatives: Newton's, with the Hessian shifted to be positive definite."""
+    gx, gy, hxx, hxy, hyy = out[1], out[2], out[3], out[4], out[5]
+    mean, spread = 0.5 * (hxx + hyy), np.sqrt(0.25 * (hxx - hyy) ** 2 + hxy * hxy)
+    shift = max(0.0, 1e-3 * (abs(mean) + spread) - (mean - spread))
+    hxx, hyy = hxx + shift, hyy + shift
+    det = hxx * hyy - hxy * hxy
+    return -(hyy * gx - hxy * gy) / det, -(hxx * gy - hxy * gx) / det
+
+
+@kernel
+def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) -> None:
+    """Lower the energy of rings that hold a quad worse than `good`, node by node, in place."""
+    active = free.copy()
+    now, then = np.empty(6), np.empty(6)
+    for _ in range(sweeps):
+        moved = False
+        for v in range(len(points)):
+            if not (active[v] and free[v]):
+                continue
+            active[v] = False
+            if ring_quality(points, rings, v) >= good:
+                continue
+            _ring_energy(points, rings, v, now)
+            if not np.isfinite(now[0]) or now[0] == 0.0:
+                continue
+            dx, dy = _newton_step(now)
+            x, y = points[v, 0], points[v, 1]
+            c = rings.corners[rings.offsets[v]]
+            w = rings.quads[c >> 2, (c + 1) & 3]
+            reach = abs(points[w, 0] - x) + abs(points[w, 1] - y)
+            for _ in range(HALVINGS):
+                points[v, 0], points[v, 1] = x + dx, y + dy
+                _ring_energy(points, rings, v, then)
+                if then[0] < now[0]:
+                    break
+                points[v, 0], points[v, 1] = x, y
+                dx, dy = 0.5 * dx, 0.5 * dy
+            if abs(points[v, 0] - x) + abs(points[v, 1] - y) > TOLERANCE * reach:
+                _activate_ring(active, rings, v)
+                moved = True
+        if not moved:
+            break
+
+
+@kernel
+def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float) -> int:
+    """Raise the worst scaled Jacobian of rings below `bad` by a pattern search, in place; return the rings left bad."""
+    left = 0
+    for _ in range(rounds):
+        left = 0
+        for v in range(len(points)):
+            if not free[v] or rings.offsets[v] == rings.offsets[v + 1]:
+                continue
+            best = ring_quality(points, rings, v)
+            if best >= bad:
+                continue
+            step = 0.0
+            for i in range(rings.offsets[v], rings.offsets[v + 1]):
+                c = rings.corners[i]
+                w = rings.quads[c >> 2, (c + 1) & 3]
+                step = max(step, np.hypot(points[w, 0] - points[v, 0], points[w, 1] - points[v, 1]))
+            step *= 0.3
+            for _ in range(8):
+                x, y = points[v, 0], points[v, 1]
+                best_x, best_y = x, y
+                for d in range(8):
+                    points[v, 0] = x + step * np.cos(d * np.pi / 4)
+                    points[v, 1] = y + step * np.sin(d * np.pi / 4)
+                    quality = ring_quality(points, rings, v)
+                    if quality > best + 1e-9:
+                        best, best_x, best_y = quality, points[v, 0], points[v, 1]
+                points[v, 0], points[v, 1] = best_x, best_y
+                if best_x == x and best_y == y:
+                    step *= 0.5
+            if best < bad:
+                left += 1
+        if left == 0:
+            break
+    return left
+
+
+@kernel
+def _move_towards(points: Points, rings: Rings, targets: Points, v: int) -> bool:
+    """Move node v to its target, or half-way, where its ring stays valid; return whether it is there."""
+    x, y = points[v, 0], points[v, 1]
+    if x == targets[v, 0] and y == targets[v, 1]:
+        return True
+    floor = min(0.5 * ring_quality(points, rings, v), 0.3)
+    for share in (1.0, 0.5, 0.25):
+        points[v, 0] = targets[v, 0] if share == 1.0 else x + share * (targets[v, 0] - x)
+        points[v, 1] = targets[v, 1] if share == 1.0 else y + share * (targets[v, 1] - y)
+        if ring_quality(points, rings, v) > floor:
+            return share == 1.0
+    points[v, 0], points[v, 1] = x, y
+    return False
+
+
+@kernel
+def fit_rim(points: Points, rings: Rings, on_rim: Flags, targets: Points, rounds: int) -> Flags:
+    """Move rim nodes to their targets, in place, making room inside; return which of them did not get there."""
+    late = on_rim.copy()
+    for _ in range(rounds):
+        left = 0
+        for v in range(len(points)):
+            if late[v]:
+                late[v] = not _move_towards(points, rings, targets, v)
+                left += late[v]
+        if left == 0:
+            break
+        make_room = np.zeros(len(points), np.bool_)
+        for v in range(len(points)):
+            if late[v]:
+                _activate_ring(make_room, rings, v)
+        for v in range(len(points)):
+            make_room[v] = make_room[v] and not on_rim[v]
+        laplace(points, rings, make_room, 2)
+        untangle(points, rings, make_room, 1, BAD)
+    return late
+
+
+@kernel
+def worst_of_faces(points: Points, quads: Ids, face: Ids, n_faces: int) -> Points:
+    """Worst scaled Jacobian of each face's quads, 1 where it has none."""
+    worst = np.ones(n_faces)
+    for q in range(len(quads)):
+        worst[face[q]] = min(worst[face[q]], quad_quality(points, quads, q))
+    return worst

@@ -1,0 +1,185 @@
+"""The Catmull-Clark split, which makes all cells quads, and the split of every quad into four.
+
+         c                c--n--b           mid-points on edges, one point in the middle of each cell:
+        / \\               |  |  |           a triangle gives three quads, a quad gives four
+       n   m              w--o--m
+      /  o  \\             |  |  |
+     a---m---b            d--s--a
+
+Reference: E. Catmull, J. Clark, CAD 10 (1978), https://doi.org/10.1016/0010-4485(78)90110-0
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cutting import CutMesh
+from .frontal import wanted_quads
+from .jit import kernel
+from .triangulation import Constraints
+
+Ids = NDArray[np.int64]
+Points = NDArray[np.float64]
+
+INNER_VALENCE = 4
+
+
+class FaceQuads(NamedTuple):
+    """Quads of faces that share no point: every constraint is rim."""
+
+    points: Points  #: float64 (n, 2)
+    quads: Ids  #: int64 (n_quads, 4), counter-clockwise
+    face: Ids  #: int64 (n_quads,), region of each quad
+    origin: Ids  #: int64 (n,), id of each rim point in the boundary graph, -1 inside
+    wanted: Ids  #: int64 (n,), number of quads that a point should have: 4 inside, by the angle on the rim
+
+
+def split_composed(mesh: CutMesh, mate: Ids, inner_origin_from: int) -> FaceQuads:
+    """Split pairs into four quads and single triangles into three.
+
+    Parameters
+    ----------
+    mesh : CutMesh
+        Triangles.
+    mate : int64, shape (n_triangles,)
+        From `compose`.
+    inner_origin_from : int
+        Points of the mesh with this origin or a higher one are not of the boundary graph.
+    """
+    points, quads, owner, origin, middle_of = _split_composed(mesh.points, mesh.triangles, mesh.twins, mate, mesh.middle)
+    n = len(mesh.points)
+    origin[:n] = np.where(mesh.on_rim & (mesh.origin < inner_origin_from), mesh.origin, -1)
+    wanted = np.full(len(points), INNER_VALENCE, np.int64)
+    wanted[:n][mesh.on_rim] = wanted_quads(mesh.angle[mesh.on_rim])
+    wanted[n:][origin[n:] >= 0] = 2
+    return FaceQuads(points, quads, mesh.face[owner], origin, wanted)
+
+
+@kernel
+def _split_composed(
+    points: Points, triangles: Ids, twins: Ids, mate: Ids, middle: Ids
+) -> tuple[Points, Ids, Ids, Ids, Ids]:
+    """Return points, quads, triangle of each quad, origin of each point, and the mid-point of each half-edge."""
+    n, n_triangles = len(points), len(triangles)
+    capacity = n + 3 * n_triangles + n_triangles + 1
+    new_points = np.empty((capacity, 2))
+    origin = np.full(capacity, -1, np.int64)
+    new_points[:n] = points
+    mid = np.full(3 * n_triangles, -1, np.int64)
+    flat = triangles.ravel()
+    count = n
+    for h in range(3 * n_triangles):
+        if mid[h] >= 0 or mate[h // 3] == h:
+            continue
+        a, b = flat[h], flat[h - h % 3 + (h % 3 + 1) % 3]
+        new_points[count, 0] = 0.5 * (points[a, 0] + points[b, 0])
+        new_points[count, 1] = 0.5 * (points[a, 1] + points[b, 1])
+        origin[count] = middle[h]
+        mid[h] = count
+        if twins[h] >= 0:
+            mid[twins[h]] = count
+        count += 1
+    quads = np.empty((3 * n_triangles, 4), np.int64)
+    owner = np.empty(3 * n_triangles, np.int64)
+    n_quads = 0
+    edges = np.empty(4, np.int64)  # half-edges around the cell
+    for t in range(n_triangles):
+        h = mate[t]
+        if h >= 0 and twins[h] < h:
+            continue
+        if h < 0:
+            sides = 3
+            edges[0], edges[1], edges[2] = 3 * t, 3 * t + 1, 3 * t + 2
+        else:
+            g, sides = twins[h], 4
+            edges[0], edges[1] = h - h % 3 + (h % 3 + 1) % 3, h - h % 3 + (h % 3 + 2) % 3
+            edges[2], edges[3] = g - g % 3 + (g % 3 + 1) % 3, g - g % 3 + (g % 3 + 2) % 3
+        x, y = 0.0, 0.0
+        for i in range(sides):
+            x += points[flat[edges[i]], 0] / sides
+            y += points[flat[edges[i]], 1] / sides
+        new_points[count, 0], new_points[count, 1] = x, y
+        for i in range(sides):
+            quads[n_quads, 0] = flat[edges[i]]
+            quads[n_quads, 1] = mid[edges[i]]
+            quads[n_quads, 2] = count
+            quads[n_quads, 3] = mid[edges[(i + sides - 1) % sides]]
+            owner[n_quads] = t
+            n_quads += 1
+        count += 1
+    return new_points[:count].copy(), quads[:n_quads].copy(), owner[:n_quads].copy(), origin[:count].copy(), mid
+
+
+def split_quads(mesh: FaceQuads, twins: Ids, middle: Ids) -> FaceQuads:
+    """Split every quad into four.
+
+    Parameters
+    ----------
+    mesh : FaceQuads
+        Quads.
+    twins : int64, shape (4 n_quads,)
+        Opposite half-edges, -1 on the rim.
+    middle : int64, shape (4 n_quads,)
+        Id in the boundary graph of the point that lies between the ends of each rim half-edge.
+    """
+    points, quads, origin = _split_quads(mesh.points, mesh.quads, twins, middle)
+    n = len(mesh.points)
+    origin[:n] = mesh.origin
+    wanted = np.full(len(points), INNER_VALENCE, np.int64)
+    wanted[:n] = mesh.wanted
+    wanted[n:][origin[n:] >= 0] = 2
+    return FaceQuads(points, quads, np.repeat(mesh.face, 4), origin, wanted)
+
+
+@kernel
+def _split_quads(points: Points, quads: Ids, twins: Ids, middle: Ids) -> tuple[Points, Ids, Ids]:
+    """Return points, quads (four for each one, beginning at its corners) and origin of the new points."""
+    n, n_quads = len(points), len(quads)
+    new_points = np.empty((n + 5 * n_quads, 2))
+    new_points[:n] = points
+    origin = np.full(n + 5 * n_quads, -1, np.int64)
+    mid = np.full(4 * n_quads, -1, np.int64)
+    flat = quads.ravel()
+    count = n
+    for h in range(4 * n_quads):
+        if mid[h] < 0:
+            a, b = flat[h], flat[h - h % 4 + (h % 4 + 1) % 4]
+            new_points[count, 0] = 0.5 * (points[a, 0] + points[b, 0])
+            new_points[count, 1] = 0.5 * (points[a, 1] + points[b, 1])
+            mid[h] = count
+            if twins[h] >= 0:
+                mid[twins[h]] = count
+            else:
+                origin[count] = middle[h]
+            count += 1
+    new_quads = np.empty((4 * n_quads, 4), np.int64)
+    for q in range(n_quads):
+        new_points[count, 0] = 0.25 * (
+            points[quads[q, 0], 0] + points[quads[q, 1], 0] + points[quads[q, 2], 0] + points[quads[q, 3], 0]
+        )
+        new_points[count, 1] = 0.25 * (
+            points[quads[q, 0], 1] + points[quads[q, 1], 1] + points[quads[q, 2], 1] + points[quads[q, 3], 1]
+        )
+        for k in range(4):
+            new_quads[4 * q + k, 0] = quads[q, k]
+            new_quads[4 * q + k, 1] = mid[4 * q + k]
+            new_quads[4 * q + k, 2] = count
+            new_quads[4 * q + k, 3] = mid[4 * q + (k + 3) % 4]
+        count += 1
+    return new_points[:count].copy(), new_quads, origin[:count].copy()
+
+
+@kernel
+def middles_of(quads: Ids, twins: Ids, origin: Ids, table: Constraints) -> Ids:
+    """Look up the boundary point between the ends of each rim half-edge; -1 inside."""
+    middle = np.full(twins.size, -1, np.int64)
+    for h in range(twins.size):
+        if twins[h] < 0:
+            tail, head = origin[quads[h >> 2, h & 3]], origin[quads[h >> 2, (h + 1) & 3]]
+            for i in range(table.offsets[tail], table.offsets[tail + 1]):
+                if table.head[i] == head:
+                    middle[h] = table.middle[i]
+    return middle
