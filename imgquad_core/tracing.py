@@ -1,0 +1,151 @@
+"""A `QuadMesh` from bare quads with materials: regions, chains and kinds of points are found anew."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from imgquad_core.errors import InputError
+from imgquad_core.femesh import Floats, Ints, half_edge_twins
+from imgquad_core.model import VOID, Materials, PointKind, QuadMesh
+
+SHARP = np.cos(np.radians(50.0))  #: a boundary that turns more at a node has a corner there
+
+
+def trace_mesh(points: ArrayLike, quads: ArrayLike, material: ArrayLike, materials: Materials) -> QuadMesh:
+    """Return the mesh of `quads` with its boundaries.
+
+    Parameters
+    ----------
+    points : array_like of float, shape (n, 2)
+        Nodes.
+    quads : array_like of int, shape (m, 4)
+        Corners of each quad, all quads counter-clockwise or all clockwise.
+    material : array_like of int, shape (m,)
+        Material of each quad.
+    materials : Materials
+        Their names.
+
+    Returns
+    -------
+    QuadMesh
+        Quads counter-clockwise, in the same order. What lies on the bounding box is taken for the picture's border.
+
+    Raises
+    ------
+    InputError
+        A quad that turns the wrong way or has no area, or an edge of more than two quads.
+    """
+    xy, corners = np.asarray(points, np.float64), _counter_clockwise(np.asarray(points), np.asarray(quads, np.int64))
+    label = np.asarray(material, np.int32)
+    twin = half_edge_twins(corners, len(xy))
+    _assert_manifold(corners, len(xy))
+    region, region_label = _regions(twin, label)
+    beside = np.where(twin >= 0, region[twin // 4], VOID)
+    own = np.repeat(region, 4)
+    bound = np.flatnonzero(own != beside)
+    once = bound[(twin[bound] < 0) | (bound < twin[bound])]
+    edges = np.stack([corners.ravel()[once], np.roll(corners, -1, axis=1).ravel()[once]], axis=1)
+    kind = _kinds(xy, edges)
+    chains, first = _walk(edges, kind, len(xy))
+    left, right = own[once], beside[once]
+    sides = [(left[e], right[e]) if forward else (right[e], left[e]) for e, forward in first]
+    return QuadMesh(
+        points=xy,
+        point_kind=kind,
+        quads=corners,
+        quad_region=region,
+        region_label=region_label,
+        chain_offsets=np.cumsum([0] + [len(c) for c in chains]),
+        chain_points=np.concatenate(chains),
+        chain_regions=np.array(sides),
+        materials=materials,
+    )
+
+
+def _counter_clockwise(points: Floats, quads: Ints) -> Ints:
+    x, y = points[quads, 0], points[quads, 1]
+    area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+    if (area < 0).all():
+        return np.ascontiguousarray(quads[:, ::-1])
+    if (area <= 0).any():
+        bad = int(np.argmax(area <= 0))
+        raise InputError(
+            f"quad {bad} turns clockwise or has no area while others turn counter-clockwise: mend the mesh"
+        )
+    return quads
+
+
+def _assert_manifold(quads: Ints, n_points: int) -> None:
+    key = quads.ravel() * n_points + np.roll(quads, -1, axis=1).ravel()
+    unique, count = np.unique(key, return_counts=True)
+    if (count > 1).any():
+        a, b = divmod(int(unique[np.argmax(count > 1)]), n_points)
+        raise InputError(f"the edge between points {a} and {b} belongs to more than two quads, or quads overlap there")
+
+
+def _regions(twin: Ints, label: NDArray[np.int32]) -> tuple[Ints, NDArray[np.int32]]:
+    """Find connected parts of one material, numbered by their first quads."""
+    half = np.flatnonzero(twin >= 0)
+    half = half[label[half // 4] == label[twin[half] // 4]]
+    graph = coo_array((np.ones(len(half), np.int8), (half // 4, twin[half] // 4)), shape=(len(label), len(label)))
+    found = connected_components(graph, directed=False)[1]
+    _, first, region = np.unique(found, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[region.ravel()], label[np.sort(first)]
+
+
+def _kinds(points: Floats, edges: Ints) -> NDArray[np.uint8]:
+    degree = np.bincount(edges.ravel(), minlength=len(points))
+    kind = np.full(len(points), PointKind.INTERIOR, np.uint8)
+    kind[degree == 2] = PointKind.FREE
+    low, high = points.min(axis=0), points.max(axis=0)
+    near = 1e-9 * float((high - low).max())
+    on_box = (points - low <= near) | (high - points <= near)
+    kind[on_box.any(axis=1) & (degree > 0)] = PointKind.FRAME
+    kind[(on_box.all(axis=1) & (degree > 0)) | _is_sharp(points, edges, degree)] = PointKind.CORNER
+    kind[degree > 2] = PointKind.JUNCTION
+    return kind
+
+
+def _is_sharp(points: Floats, edges: Ints, degree: Ints) -> NDArray[np.bool_]:
+    """Points between two edges at less than 130 degrees."""
+    along = points[edges[:, 1]] - points[edges[:, 0]]
+    along = along / np.linalg.norm(along, axis=1)[:, None]
+    # the unit vectors to both neighbours add up to zero where the boundary runs straight on
+    to_both = np.zeros((len(points), 2))
+    np.add.at(to_both, edges[:, 0], along)
+    np.add.at(to_both, edges[:, 1], -along)
+    cosine = 1 - (to_both**2).sum(axis=1) / 2  # of the turn
+    sharp: NDArray[np.bool_] = (degree == 2) & (cosine < SHARP)
+    return sharp
+
+
+def _walk(edges: Ints, kind: NDArray[np.uint8], n_points: int) -> tuple[list[Ints], list[tuple[int, bool]]]:
+    """Chains from junction to junction, then closed ones; of each its first edge and whether it runs along that."""
+    ends = edges.ravel()
+    order = np.argsort(ends, kind="stable")
+    start = np.searchsorted(ends[order], np.arange(n_points + 1)).tolist()
+    at = order.tolist()  # half-places 2 e + side, grouped by point
+    edge_list, used = edges.tolist(), [False] * len(edges)
+    is_stop = (kind == PointKind.JUNCTION).tolist()
+    chains, first = [], []
+    junctions = np.flatnonzero(kind == PointKind.JUNCTION).tolist()
+    for point in junctions + np.unique(ends).tolist():
+        for place in at[start[point] : start[point + 1]]:
+            if used[place // 2]:
+                continue
+            first.append((place // 2, place % 2 == 0))
+            chain, here = [point], place
+            while True:
+                used[here // 2] = True
+                there = edge_list[here // 2][1 - here % 2]
+                chain.append(there)
+                if is_stop[there] or there == point:
+                    break
+                here = next(p for p in at[start[there] : start[there + 1]] if not used[p // 2])
+            chains.append(np.array(chain, np.int64))
+    return chains, first

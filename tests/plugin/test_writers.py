@@ -1,0 +1,102 @@
+"""Solver files through PyVista's own save, and grids of all element kinds."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from handmade import disk, jiggle, round_inclusion, staircase
+from imgquad_core.errors import InputError
+from imgquad_core.sets import fe_mesh
+from imgquad_core.writers import write_mesh
+from imgquad_mesh.convert import to_grid
+from imgquad_mesh.elements import ElementOptions, make_elements
+from imgquad_mesh.writers import from_grid, to_fe_grid
+
+MESH = staircase(disk(10, 3), ("matrix", "disk"), jiggle)
+
+
+def test_a_grid_becomes_the_mesh_it_was_made_of() -> None:
+    again = from_grid(to_grid(MESH))
+    assert (again.points == MESH.points).all()
+    assert (again.quads == MESH.quads).all()
+    assert (again.quad_material == MESH.quad_material).all()
+    assert again.materials.names == MESH.materials.names
+    assert fe_mesh(again).side_sets.keys() == fe_mesh(MESH).side_sets.keys()
+
+
+@pytest.mark.parametrize("extension", [".inp", ".msh", ".bdf", ".e"])
+def test_save_writes_the_same_bytes_as_the_core(tmp_path: Path, extension: str) -> None:
+    to_grid(MESH).save(tmp_path / f"a{extension}")
+    write_mesh(from_grid(to_grid(MESH)), tmp_path / f"b{extension}")
+    assert (tmp_path / f"a{extension}").read_bytes() == (tmp_path / f"b{extension}").read_bytes()
+
+
+def test_options_reach_the_writer_and_the_elements(tmp_path: Path) -> None:
+    grid = to_grid(MESH)
+    grid.save(tmp_path / "a.inp", analysis="plane strain", order=2)
+    assert "TYPE=CPE8" in (tmp_path / "a.inp").read_text()
+    grid.save(tmp_path / "a.inp", cohesive=[("disk", "matrix")], extrude=2.0, layers=2)
+    assert "TYPE=COH3D8" in (tmp_path / "a.inp").read_text()
+    with pytest.raises(InputError, match="no option 'analysys'"):
+        grid.save(tmp_path / "a.inp", analysys="plane strain")
+
+
+def test_plugins_are_found_by_name_and_inp_is_still_read_as_avs(tmp_path: Path) -> None:
+    program = (
+        "import sys, pyvista as pv\n"
+        "grid = pv.ImageData(dimensions=(4, 4, 1)).cast_to_structured_grid().cast_to_unstructured_grid()\n"
+        "assert 'imgquad_mesh' not in sys.modules\n"
+        "grid.save(sys.argv[1])\n"
+        "open(sys.argv[2], 'w').write('4 1 0 0 0\\n1 0 0 0\\n2 1 0 0\\n3 1 1 0\\n4 0 1 0\\n1 1 quad 1 2 3 4\\n')\n"
+        "assert pv.read(sys.argv[2]).n_cells == 1\n"
+    )
+    avs = tmp_path / "avs.inp"
+    subprocess.run([sys.executable, "-W", "error", "-c", program, str(tmp_path / "a.inp"), str(avs)], check=True)
+    assert "*ELEMENT, TYPE=CPS4" in (tmp_path / "a.inp").read_text()
+
+
+def test_what_is_no_flat_grid_of_quads_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no quads"):
+        pv.ImageData(dimensions=(3, 3, 1)).cast_to_structured_grid().save(tmp_path / "a.inp")
+    with pytest.raises(InputError, match="9 of 9 cells are no quads"):
+        pv.ImageData(dimensions=(4, 4, 1)).cast_to_unstructured_grid().save(tmp_path / "a.inp")
+    with pytest.raises(InputError, match="z = constant"):
+        to_grid(MESH).rotate_x(90).save(tmp_path / "a.inp")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("options", "cells"),
+    [
+        (ElementOptions(), {9: 352}),
+        (ElementOptions(order=2), {23: 352}),
+        (ElementOptions(order=2, nodes=9), {28: 352}),
+        (ElementOptions(cohesive="all"), {9: 352 + 32}),
+        (ElementOptions(order=2, cohesive="all"), {23: 352, 30: 32}),
+        (ElementOptions(extrude=4.0, layers=3), {12: 3 * 352}),
+    ],
+)
+def test_grids_of_all_kinds_have_the_area_and_the_sets(tmp_path: Path, options: ElementOptions, cells: dict) -> None:
+    mesh = make_elements(round_inclusion(8, 10, 40, 3), options)
+    to_fe_grid(mesh).save(tmp_path / "a.vtu")
+    grid = pv.read(tmp_path / "a.vtu")
+    kinds, counts = np.unique(grid.celltypes, return_counts=True)
+    assert dict(zip(kinds.tolist(), counts.tolist(), strict=True)) == cells
+    size = grid.compute_cell_sizes()
+    total = size["Volume"].sum() if options.extrude else size["Area"].sum()
+    assert total == pytest.approx(1600 * (options.extrude or 1), rel=1e-9)
+    assert grid.point_data["set left"].sum() == len(mesh.node_sets["left"])
+    assert list(grid.field_data["material_names"]) == ["matrix", "disk"]
+
+
+def test_orders_that_are_not_made_are_refused() -> None:
+    with pytest.raises(InputError, match="order is 3"):
+        ElementOptions(order=3)
+    with pytest.raises(InputError, match="exclude each other"):
+        ElementOptions(order=2, extrude=1.0)
