@@ -56,19 +56,22 @@ def find_conflicts(points: Floats, segments: Ints, chain: Ints, is_new: Flags, s
 
 @kernel
 def _bucket_segments(points: Floats, segments: Ints, cell: float, n_across: int, n_up: int) -> tuple[Ints, Ints]:
-    """Sort segments into the cells of the boxes around pieces of them, at most a cell long."""
+    """Sort segments into the cells of boxes around pieces of them, at most a cell long, and the room they need."""
     start = np.zeros(n_across * n_up + 1, np.int64)
     items = np.empty(0, np.int64)
     for fill in range(2):
         for k in range(len(segments)):
             a, b = points[segments[k, 0]], points[segments[k, 1]]
             pieces = int(max(abs(b[0] - a[0]), abs(b[1] - a[1])) / cell) + 1
+            margin = _ROOM * np.hypot(b[0] - a[0], b[1] - a[1])
             done_left = done_right = done_low = done_high = -1
             for p in range(pieces):
                 x0, x1 = a[0] + (b[0] - a[0]) * p / pieces, a[0] + (b[0] - a[0]) * (p + 1) / pieces
                 y0, y1 = a[1] + (b[1] - a[1]) * p / pieces, a[1] + (b[1] - a[1]) * (p + 1) / pieces
-                left, right = int(min(x0, x1) / cell), int(max(x0, x1) / cell)
-                low, high = int(min(y0, y1) / cell), int(max(y0, y1) / cell)
+                left = max(int((min(x0, x1) - margin) / cell), 0)
+                right = min(int((max(x0, x1) + margin) / cell), n_across - 1)
+                low = max(int((min(y0, y1) - margin) / cell), 0)
+                high = min(int((max(y0, y1) + margin) / cell), n_up - 1)
                 for row in range(low, high + 1):
                     for column in range(left, right + 1):
                         if done_left <= column <= done_right and done_low <= row <= done_high:
@@ -98,7 +101,7 @@ def _compare_in_cells(
     marks: NDArray[np.uint8],
 ) -> None:
     for at in range(len(start) - 1):
-        for i in range(start[at], start[at + 1]):
+        for i in range(start[at], start[at + 1] if _any_new(chain, is_new, items, start[at], start[at + 1]) else 0):
             k = items[i]
             for j in range(i + 1, start[at + 1]):
                 other = items[j]
@@ -109,6 +112,14 @@ def _compare_in_cells(
         a, b = grid[segments[k, 0]], grid[segments[k, 1]]
         if a[0] == b[0] and a[1] == b[1]:
             marks[k] = CROSSING
+
+
+@kernel
+def _any_new(chain: Ints, is_new: Flags, items: Ints, low: int, high: int) -> bool:
+    for i in range(low, high):
+        if is_new[chain[items[i]]]:
+            return True
+    return False
 
 
 @kernel

@@ -86,3 +86,55 @@ def pin_ends(points: Floats, curves: Curves, node: Floats) -> None:
 def per_point(curves: Curves, values: NDArray[Any]) -> NDArray[Any]:
     """Repeat one value a chain for each of its dense points."""
     return np.repeat(values, np.diff(curves.offsets))
+
+
+@kernel
+def line_beside(
+    curves: Curves, c: int, i: int, step: int, near: float, far: float
+) -> tuple[int, float, float, float, float, float]:
+    """Total least squares line through the points of chain c from arc `near` to `far` on one side of its point i.
+
+    Gives the number of points a point on the line relative to point i, its
+    direction (away from point i) and the root mean square residual.
+    """
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    n, k, gone = 0, i, 0.0
+    x = y = xx = xy = yy = 0.0
+    while gone <= far:
+        if gone >= near:
+            dx, dy = curves.raw[k, 0] - curves.raw[i, 0], curves.raw[k, 1] - curves.raw[i, 1]
+            n, x, y, xx, xy, yy = n + 1, x + dx, y + dy, xx + dx * dx, xy + dx * dy, yy + dy * dy
+        if k == (last if step > 0 else first):
+            if curves.ends[c, 0] >= 0:
+                break
+            k = first if step > 0 else last
+        k += step
+        gone += abs(curves.arc[k] - curves.arc[k - step])
+    if n < 2:
+        return 0, 0.0, 0.0, 1.0, 0.0, 0.0
+    x, y = x / n, y / n
+    xx, xy, yy = xx / n - x * x, xy / n - x * y, yy / n - y * y
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    spread = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
+    tx, ty = np.cos(angle), np.sin(angle)
+    if tx * x + ty * y < 0:
+        tx, ty = -tx, -ty
+    return n, x, y, tx, ty, np.sqrt(max(spread, 0.0))
+
+
+@kernel
+def start_closed_at(curves: Curves, flags: Flags) -> None:
+    """Turn closed chains round, in place, so that they start at their first flagged point (and so the flags)."""
+    for c in range(len(curves.ends)):
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        if curves.ends[c, 0] >= 0 or flags[first] or not np.any(flags[first:last]):
+            continue
+        by = np.argmax(flags[first:last])
+        points, marks = curves.raw[first:last].copy(), flags[first:last].copy()
+        n = last - first
+        for k in range(n + 1):
+            curves.raw[first + k] = points[(k + by) % n]
+            flags[first + k] = marks[(k + by) % n]
+        for i in range(first + 1, last + 1):
+            step = curves.raw[i] - curves.raw[i - 1]
+            curves.arc[i] = curves.arc[i - 1] + np.hypot(step[0], step[1])

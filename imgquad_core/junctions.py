@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imgquad_core.curves import Curves, Floats
+from imgquad_core.curves import Curves, Floats, line_beside
 from imgquad_core.jit import kernel
 from imgquad_core.model import PointKind
 
@@ -72,28 +72,9 @@ def _limit(curves: Curves, room: Floats, v: int) -> float:
 
 
 @kernel
-def _line(curves: Curves, socket: int, near: float, far: float) -> tuple[int, float, float, float, float, float]:
-    """Total least squares line through a chain from arc `near` to `far` away from one of its ends.
-
-    Gives the number of points, a point on the line relative to the end, its direction, the residual (rms).
-    """
-    c = socket // 2
-    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
-    end, step = (last, -1) if socket % 2 else (first, 1)
-    n, i = 0, end
-    x = y = xx = xy = yy = 0.0
-    while first <= i <= last and abs(curves.arc[i] - curves.arc[end]) <= far:
-        if abs(curves.arc[i] - curves.arc[end]) >= near:
-            dx, dy = curves.raw[i, 0] - curves.raw[end, 0], curves.raw[i, 1] - curves.raw[end, 1]
-            n, x, y, xx, xy, yy = n + 1, x + dx, y + dy, xx + dx * dx, xy + dx * dy, yy + dy * dy
-        i += step
-    if n == 0:
-        return 0, 0.0, 0.0, 1.0, 0.0, 0.0
-    x, y = x / n, y / n
-    xx, xy, yy = xx / n - x * x, xy / n - x * y, yy / n - y * y
-    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
-    spread = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
-    return n, x, y, np.cos(angle), np.sin(angle), np.sqrt(max(spread, 0.0))
+def _end(curves: Curves, socket: int) -> int:
+    """Dense point of a chain at one of its ends."""
+    return curves.offsets[socket // 2 + 1] - 1 if socket % 2 else curves.offsets[socket // 2]
 
 
 @kernel
@@ -101,7 +82,7 @@ def _meet(curves: Curves, v: int) -> tuple[float, float]:
     """Shift of a node to the point nearest to the lines of its chains."""
     a, b, d, p, q = _PULL, 0.0, _PULL, 0.0, 0.0
     for socket in curves.sockets[curves.node_offsets[v] : curves.node_offsets[v + 1]]:
-        n, x, y, tx, ty, _ = _line(curves, socket, _NEAR, _FAR)
+        n, x, y, tx, ty, _ = line_beside(curves, socket // 2, _end(curves, socket), 1 - 2 * (socket % 2), _NEAR, _FAR)
         if n < 3:
             continue
         off = tx * y - ty * x
@@ -119,8 +100,8 @@ def _slide(curves: Curves, v: int, axis: int, windows: Floats) -> tuple[float, f
         if curves.is_frame[socket // 2]:
             continue
         for far in windows:
-            n, x, y, tx, ty, rms = _line(curves, socket, 0.4, far)
             c = socket // 2
+            n, x, y, tx, ty, rms = line_beside(curves, c, _end(curves, socket), 1 - 2 * (socket % 2), 0.4, far)
             along, across = (tx, ty) if axis == 0 else (ty, tx)
             if n < 12 or far > curves.arc[curves.offsets[c + 1] - 1] or rms > _BORDER_NOISE or abs(across) < 0.35:
                 continue

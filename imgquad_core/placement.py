@@ -73,11 +73,12 @@ def place_nodes(
         at[n] = first
         corner[n] = is_corner[first]
         begin = first
+        pieces = 1 + np.sum(is_corner[first + 1 : last])
         for i in range(first + 1, last + 1):
             if i < last and not is_corner[i] and not exact[c]:
                 continue
-            whole = begin == first and i == last
-            number = 1 if exact[c] else _count(curves, cost, limit, begin, i, at_least[c], whole)
+            least = -(-at_least[c] // pieces)
+            number = 1 if exact[c] else _count(curves, cost, limit, begin, i, least)
             _divide(cost, begin, i, 2 * number, at, n)
             n += 2 * number
             corner[n] = is_corner[i]
@@ -87,11 +88,10 @@ def place_nodes(
 
 
 @kernel
-def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, at_least: int, whole: bool) -> int:
+def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, least: int) -> int:
     """Number of coarse segments of a piece."""
     total = 0.5 * (cost[end] - cost[begin])
     length = curves.arc[end] - curves.arc[begin]
-    least = at_least if whole else (at_least + 1) // 2
     if total > _LONG and length > 2 * _COARSE * total * limit[begin]:
         return max(2 * int(round(0.5 * total)), 2 * ((least + 1) // 2))
     return max(int(np.ceil(total - 0.3)), least)
@@ -110,42 +110,56 @@ def _divide(cost: Floats, begin: int, end: int, number: int, at: Floats, n: int)
 
 
 @kernel
+def _point(points: Floats, at: float) -> tuple[float, float]:
+    i = min(int(at), len(points) - 2)
+    t = at - i
+    return (
+        points[i, 0] + t * (points[i + 1, 0] - points[i, 0]),
+        points[i, 1] + t * (points[i + 1, 1] - points[i, 1]),
+    )
+
+
+@kernel
 def points_at(points: Floats, at: Floats) -> Floats:
     """Points of the curves at fractional indices."""
     found = np.empty((len(at), 2))
     for k in range(len(at)):
-        i = min(int(at[k]), len(points) - 2)
-        t = at[k] - i
-        found[k, 0] = points[i, 0] + t * (points[i + 1, 0] - points[i, 0])
-        found[k, 1] = points[i, 1] + t * (points[i + 1, 1] - points[i, 1])
+        found[k, 0], found[k, 1] = _point(points, at[k])
     return found
 
 
 @kernel
 def even_out(points: Floats, placed: Placement, exact: Flags, edge_ratio: float) -> None:
-    """Move nodes towards the bisector of their neighbours, along the curve, until edges keep within `edge_ratio`."""
+    """Move nodes towards the bisector of their neighbours, along the curve, until edges keep within `edge_ratio`.
+
+    A node goes halfway to the point of the curve where the edges to both neighbours are equal, which is where the
+    curve crosses the perpendicular bisector (paper, eq. 1). Corners and chains of `exact` stay as they are.
+    """
     at = placed.at
-    xy = points_at(points, at)
-    for c in range(len(placed.offsets) - 1):
+    for c in range(len(exact)):
+        first, last = placed.offsets[c], placed.offsets[c + 1] - 1
         for _ in range(0 if exact[c] else _SWEEPS):
-            for k in range(placed.offsets[c] + 1, placed.offsets[c + 1] - 1):
-                before = np.hypot(xy[k, 0] - xy[k - 1, 0], xy[k, 1] - xy[k - 1, 1])
-                after = np.hypot(xy[k + 1, 0] - xy[k, 0], xy[k + 1, 1] - xy[k, 1])
-                if placed.is_corner[k] or max(before, after) <= edge_ratio * min(before, after):
-                    continue
-                at[k] = 0.5 * (at[k] + _bisector_crossing(points, at[k - 1], at[k + 1], xy[k - 1], xy[k + 1]))
-                xy[k] = points_at(points, at[k : k + 1])[0]
+            ax, ay = _point(points, at[first])
+            x, y = _point(points, at[first + 1])
+            for k in range(first + 1, last):
+                bx, by = _point(points, at[k + 1])
+                before, after = np.hypot(x - ax, y - ay), np.hypot(bx - x, by - y)
+                if not placed.is_corner[k] and max(before, after) > edge_ratio * min(before, after):
+                    at[k] = 0.5 * (at[k] + _bisector_crossing(points, at[k - 1], at[k + 1], ax, ay, bx, by))
+                    x, y = _point(points, at[k])
+                ax, ay, x, y = x, y, bx, by
 
 
 @kernel
-def _bisector_crossing(points: Floats, low: float, high: float, a: Floats, b: Floats) -> float:
-    """Where the curve between two nodes crosses the perpendicular bisector of their chord."""
-    middle = np.array([0.5 * (low + high)])
-    for _ in range(20):
-        x, y = points_at(points, middle)[0]
-        if (x - a[0]) ** 2 + (y - a[1]) ** 2 < (x - b[0]) ** 2 + (y - b[1]) ** 2:
-            low = middle[0]
+def _bisector_crossing(points: Floats, low: float, high: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Where the curve from node a to node b crosses the perpendicular bisector of their chord."""
+    nx, ny = bx - ax, by - ay
+    offset = 0.5 * (nx * (ax + bx) + ny * (ay + by))
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        x, y = _point(points, middle)
+        if nx * x + ny * y < offset:
+            low = middle
         else:
-            high = middle[0]
-        middle[0] = 0.5 * (low + high)
-    return middle[0]
+            high = middle
+    return 0.5 * (low + high)

@@ -15,7 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.clearance import CLOSE, CROSSING, SHARP, find_conflicts, mark_sharp, snapped
+from imgquad_core.areas import polygon_areas, restore_areas
+from imgquad_core.clearance import CROSSING, SHARP, find_conflicts, mark_sharp, snapped
+from imgquad_core.corners import find_corners, place_corners
 from imgquad_core.curves import Curves, Flags, Floats, Ints, curves_of, per_point, pin_ends
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.features import local_feature_size
@@ -31,6 +33,8 @@ _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for ar
 _NARROW = 2.0  # px; reach of the local feature size that bounds shifts
 _ARC_RATIO = 2.0  # arc over distance of a foreign point of the pixel boundary
 _LEAST_SECTOR = np.radians(30.0)
+_AREA_ROOM = 0.7  # of the bound of smoothing, for the shift that restores areas
+_AREA_ROUNDS = 10
 _GENTLE_ROUNDS, _ROUNDS = 8, 14  # rounds that mind sectors and room; rounds until faulty chains get their pixels back
 
 
@@ -111,15 +115,16 @@ def smooth_boundaries(graph: BoundaryGraph, options: SmoothingOptions | None = N
     options = options or SmoothingOptions()
     curves = curves_of(graph)
     limit = per_point(curves, _asked_sizes(graph, options))
+    is_corner = find_corners(curves)
     room = np.minimum(
         _SHARE * options.max_shift,
         _ROOM * local_feature_size(curves.raw, curves, _NARROW, _ARC_RATIO),
     )
     node = place_junctions(curves, room, graph.shape)
-    is_corner = np.zeros(len(curves.raw), bool)
-    smooth = _smooth(curves, node, room)
+    smooth = _smooth(curves, node, is_corner, room)
     size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, graph.shape)
-    nodes = _place_freely(curves, smooth, node, size, limit, is_corner, options, graph.shape)
+    nodes, gently = _place_freely(curves, smooth, node, size, limit, is_corner, options, graph.shape)
+    nodes = _restore(graph, curves, nodes, room, options.max_shift, gently)
     return _graph(graph, curves, nodes)
 
 
@@ -128,13 +133,13 @@ def region_areas(graph: BoundaryGraph) -> Floats:
 
     Compare with `graph.region_pixels` for the error of smoothing.
     """
-    a, b = graph.points[graph.segments[:, 0]], graph.points[graph.segments[:, 1]]
-    chain = np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets) - 1)
-    swept = np.bincount(chain, 0.5 * (a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]), graph.n_chains)
-    area = np.zeros(len(graph.region_label) + 1)
-    np.add.at(area, graph.chain_regions[:, 0], swept)  # VOID is the last entry
-    np.add.at(area, graph.chain_regions[:, 1], -swept)
-    return area[:-1]
+    return polygon_areas(
+        np.array(graph.points),
+        np.array(graph.chain_points),
+        np.array(graph.chain_offsets),
+        graph.chain_regions,
+        len(graph.region_label),
+    )
 
 
 def _asked_sizes(graph: BoundaryGraph, options: SmoothingOptions) -> Floats:
@@ -146,18 +151,29 @@ def _asked_sizes(graph: BoundaryGraph, options: SmoothingOptions) -> Floats:
     return of_region[graph.chain_regions].min(axis=1)
 
 
-def _smooth(curves: Curves, node: Floats, room: Floats) -> Floats:
-    """Smooth all chains between their moved ends, within `room` of the pixel boundary."""
+def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats) -> Floats:
+    """Smooth all chains between their moved ends and corners, within `room` of the pixel boundary."""
     pinned = curves.raw.copy()
+    place_corners(curves, is_corner, room, pinned)
     pin_ends(pinned, curves, node)
-    inner = ~curves.is_frame
-    pieces = np.stack([curves.offsets[:-1], curves.offsets[1:] - 1], axis=1)[inner]
-    smooth = fit_pieces(pinned, curves.arc, pieces, (curves.ends[:, 0] < 0)[inner], np.array(WINDOWS))
+    pieces, closed = _pieces(curves, is_corner)
+    smooth = fit_pieces(pinned, curves.arc, pieces, closed, np.array(WINDOWS))
     shift = smooth - curves.raw
     length = np.hypot(shift[:, 0], shift[:, 1])
     smooth = curves.raw + shift * np.minimum(1.0, room / np.maximum(length, 1e-300))[:, None]
     pin_ends(smooth, curves, node)
     return smooth
+
+
+def _pieces(curves: Curves, is_corner: Flags) -> tuple[Ints, Flags]:
+    """First and last dense point of each piece between corners, off the border; is it a whole closed chain?"""
+    is_cut = is_corner.copy()
+    is_cut[curves.offsets[:-1]] = is_cut[curves.offsets[1:] - 1] = True
+    cuts = np.flatnonzero(is_cut)
+    chain = np.searchsorted(curves.offsets, cuts, side="right") - 1
+    inner = (chain[1:] == chain[:-1]) & ~curves.is_frame[chain[:-1]]
+    pieces = np.stack([cuts[:-1], cuts[1:]], axis=1)[inner]
+    return pieces, ((curves.ends[:, 0] < 0)[chain[:-1]] & ~is_corner[cuts[:-1]])[inner]
 
 
 def _place_freely(
@@ -169,8 +185,11 @@ def _place_freely(
     is_corner: Flags,
     options: SmoothingOptions,
     shape: tuple[int, int],
-) -> _Nodes:
-    """Place nodes; closer and nearer to the pixel boundary where they conflict, until they don't."""
+) -> tuple[_Nodes, bool]:
+    """Place nodes; closer and nearer to the pixel boundary where they conflict, until they don't.
+
+    Also tells whether they keep room and open sectors too.
+    """
     size = size.copy()
     withdrawn = np.zeros(len(smooth))
     exact = np.zeros(len(curves.ends), bool)
@@ -188,7 +207,7 @@ def _place_freely(
             _mark_dense(marks, level.chain, nodes.placed.at[_places(nodes.placed.offsets, step)], curves.offsets,
                         level.offsets, attempt >= 2, factor, pull)
         if worst == 0:
-            return nodes
+            return nodes, attempt < _GENTLE_ROUNDS
         is_new = _touched(curves, factor)
         size = np.maximum(size * factor, np.minimum(FINEST, limit))
         withdrawn = np.minimum(withdrawn + pull, 1.0)
@@ -312,6 +331,48 @@ def _touched(curves: Curves, factor: Floats) -> Flags:
     node[curves.ends[marked].ravel()] = True
     node[-1] = False
     return marked | node[curves.ends].any(axis=1)
+
+
+def _restore(
+    graph: BoundaryGraph, curves: Curves, nodes: _Nodes, room: Floats, max_shift: float, gently: bool
+) -> _Nodes:
+    """Give regions their areas; less where that makes conflicts."""
+    placed = nodes.placed
+    bound = _area_bounds(curves, nodes, room, max_shift)
+    shift = np.zeros(graph.n_chains)
+    tested = nodes.points
+    for attempt in range(_AREA_ROUNDS):
+        points, shift = restore_areas(
+            nodes.points, nodes.chain_points, placed.offsets, graph.chain_regions, graph.region_pixels, bound, shift
+        )
+        points = snapped(points)
+        has_moved = (points != tested).any(axis=1)[nodes.chain_points]
+        moved = np.logical_or.reduceat(has_moved, placed.offsets[:-1])
+        tested = points
+        is_bad = np.zeros(len(points), bool)
+        for step in (2, 1):
+            level = _level(nodes, step)
+            is_bad[level.segments[_conflicts(points, level, curves, moved, gently, graph.shape) > 0]] = True
+        if not is_bad.any():
+            return nodes._replace(points=points)
+        bad = is_bad[nodes.chain_points]
+        bad[1:] |= bad[:-1].copy()
+        bad[:-1] |= bad[1:].copy()
+        bound[bad] *= 0.5 if attempt < _AREA_ROUNDS // 3 else 0.0
+    return nodes
+
+
+def _area_bounds(curves: Curves, nodes: _Nodes, room: Floats, max_shift: float) -> Floats:
+    """How far each node may be shifted for areas."""
+    at = nodes.placed.at
+    home = points_at(curves.raw, at)
+    xy = nodes.points[nodes.chain_points]
+    bound = np.minimum(max_shift - np.hypot(*(xy - home).T), _AREA_ROOM * room[at.astype(np.int64)])
+    chain = np.repeat(np.arange(len(curves.ends)), np.diff(nodes.placed.offsets))
+    bound[curves.is_frame[chain] | nodes.placed.is_corner] = 0.0
+    open_ = curves.ends[:, 0] >= 0
+    bound[nodes.placed.offsets[:-1][open_]] = bound[nodes.placed.offsets[1:][open_] - 1] = 0.0
+    return np.maximum(bound, 0.0)
 
 
 def _graph(graph: BoundaryGraph, curves: Curves, nodes: _Nodes) -> BoundaryGraph:

@@ -1,0 +1,142 @@
+"""Sharp corners of chains: where two straight sides meet, and one quadratic cannot follow them.
+
+A corner of a square inclusion is cut by the pixel boundary from mid-side to mid-side; its true place is where the
+lines through both sides meet. Chains are split there, so that smoothing leaves the corner alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imgquad_core.curves import Curves, Flags, Floats, line_beside, start_closed_at
+from imgquad_core.fitting import quadratic_at
+from imgquad_core.jit import kernel
+
+_SIDE = 6.0  # px of arc of each side
+_NEAR = 0.4  # px beside the corner that are left out
+_STRAIGHT = 0.32  # px, largest residual (rms) of a side
+_TURN = 0.8  # radians, least turn between the sides
+_UNLIKE = 0.20  # px, least residual of one quadratic through both sides
+_FARTHEST = 1.5  # px from the pixel boundary
+_APART = 4.2  # px of arc between corners
+_AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
+
+
+def find_corners(curves: Curves) -> Flags:
+    """Find sharp corners; closed chains that have some are turned round, in place, to start at one.
+
+    Parameters
+    ----------
+    curves : Curves
+        The pixel boundary.
+
+    Returns
+    -------
+    bool, shape (n,)
+        Dense points that are corners; where a closed chain starts at one, its last point too.
+    """
+    is_corner = _find(curves)
+    start_closed_at(curves, is_corner)
+    return is_corner
+
+
+@kernel
+def place_corners(curves: Curves, is_corner: Flags, room: Floats, points: Floats) -> None:
+    """Move corners to where the lines of their sides meet, in place, by no more than `room`."""
+    for c in range(len(curves.ends)):
+        for i in range(curves.offsets[c], curves.offsets[c + 1]):
+            if is_corner[i]:
+                _, dx, dy = _corner_at(curves, c, i)
+                scale = min(1.0, room[i] / max(np.hypot(dx, dy), 1e-9))
+                points[i, 0], points[i, 1] = curves.raw[i, 0] + scale * dx, curves.raw[i, 1] + scale * dy
+
+
+@kernel
+def _find(curves: Curves) -> Flags:
+    score = np.zeros(len(curves.raw))
+    is_corner = np.zeros(len(curves.raw), np.bool_)
+    x, y, s, sums = np.empty(99), np.empty(99), np.empty(99), np.empty(14)
+    for c in range(len(curves.ends)):
+        if curves.is_frame[c]:
+            continue
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        for i in range(first + (curves.ends[c, 0] >= 0), last):
+            straight, dx, dy = _corner_at(curves, c, i)
+            if straight <= 0.0:
+                continue
+            n, middle = _gather(curves, c, i, x, y, s)
+            gain = quadratic_at(x[:n], y[:n], s[:n], middle, _SIDE, sums)[2]
+            if gain >= _UNLIKE:
+                j = _nearest(curves, c, i, curves.raw[i, 0] + dx, curves.raw[i, 1] + dy)
+                score[j] = max(score[j], gain + straight)
+        for i in range(first, last):
+            if score[i] > 0.0 and _is_best(curves, c, i, score):
+                is_corner[i] = _corner_at(curves, c, i)[0] > 0.0
+    return is_corner
+
+
+@kernel
+def _corner_at(curves: Curves, c: int, i: int) -> tuple[float, float, float]:
+    """How straight the sides of point i are (0: no corner), and the shift to where their lines meet."""
+    n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -1, _NEAR, _SIDE)
+    m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, 1, _NEAR, _SIDE)
+    turn = np.pi - abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
+    if n < 6 or m < 6 or max(rms_u, rms_v) > _STRAIGHT or turn < _TURN:
+        return 0.0, 0.0, 0.0
+    t = ((bx - ax) * vy - (by - ay) * vx) / (ux * vy - uy * vx)
+    x, y = ax + t * ux, ay + t * uy
+    if not (x * x + y * y < _FARTHEST**2 and x * ux + y * uy < _AHEAD and x * vx + y * vy < _AHEAD):
+        return 0.0, 0.0, 0.0
+    return 1.0 - max(rms_u, rms_v), x, y
+
+
+@kernel
+def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> tuple[int, int]:
+    """Copy the points around i; gives their number and the place of i among them."""
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    low = high = i
+    if curves.ends[c, 0] >= 0:
+        while low > first and curves.arc[i] - curves.arc[low] < _SIDE:
+            low -= 1
+        while high < last and curves.arc[high] - curves.arc[i] < _SIDE:
+            high += 1
+    else:
+        low, high = i - 12, i + 12
+    n, length = last - first, curves.arc[last]
+    for k in range(low, high + 1):
+        j = first + (k - first) % n if curves.ends[c, 0] < 0 else k
+        x[k - low], y[k - low] = curves.raw[j, 0], curves.raw[j, 1]
+        s[k - low] = curves.arc[j] + (length * ((k - first) // n) if curves.ends[c, 0] < 0 else 0.0)
+    return high - low + 1, i - low
+
+
+@kernel
+def _nearest(curves: Curves, c: int, i: int, x: float, y: float) -> int:
+    """Point of the chain nearest to (x, y), within 6 points of i."""
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    best, nearest = i, np.inf
+    for k in range(i - 6, i + 7):
+        if curves.ends[c, 0] >= 0 and not first < k < last:
+            continue
+        j = first + (k - first) % (last - first) if curves.ends[c, 0] < 0 else k
+        d2 = (curves.raw[j, 0] - x) ** 2 + (curves.raw[j, 1] - y) ** 2
+        if d2 < nearest - 1e-9:
+            best, nearest = j, d2
+    return best
+
+
+@kernel
+def _is_best(curves: Curves, c: int, i: int, score: Floats) -> bool:
+    """Is there no better corner near point i? The first one wins a tie."""
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    length = curves.arc[last]
+    for k in range(i - 12, i + 13):
+        if curves.ends[c, 0] >= 0 and not first < k < last:
+            continue
+        j = first + (k - first) % (last - first) if curves.ends[c, 0] < 0 else k
+        apart = abs(curves.arc[j] - curves.arc[i])
+        if curves.ends[c, 0] < 0:
+            apart = min(apart, length - apart)
+        if apart < _APART and (score[j] > score[i] or (score[j] == score[i] and j < i)):
+            return False
+    return True
