@@ -43,6 +43,8 @@ class ScriptParameter:
         Texts of the values of a ``RichEnum``.
     low, high : float, optional
         Limits of a ``RichDynamicFloat`` or ``RichAbsPerc``.
+    label, tooltip : str
+        Written for whoever reads the script; not read.
     """
 
     name: str
@@ -52,6 +54,8 @@ class ScriptParameter:
     choices: tuple[str, ...] = ()
     low: float | None = None
     high: float | None = None
+    label: str = ""
+    tooltip: str = ""
 
 
 @dataclass(frozen=True)
@@ -312,6 +316,7 @@ def _attributes(parameter: ScriptParameter) -> str:
     if parameter.choices:
         attrs |= {"enum_cardinality": str(len(parameter.choices))}
         attrs |= {f"enum_val{i}": text for i, text in enumerate(parameter.choices)}
+    attrs |= {key: text for key, text in (("description", parameter.label), ("tooltip", parameter.tooltip)) if text}
     return " ".join(f"{key}={quoteattr(text)}" for key, text in attrs.items())
 
 

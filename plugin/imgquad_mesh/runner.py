@@ -22,6 +22,8 @@ from imgquad_mesh.layer import Layer, load_layer, save_layer
 #: filters that leave points and faces as they are: nothing to save before the next one
 _HARMLESS = ("get_", "compute_selection", "compute_color", "compute_scalar", "compute_normal", "set_mesh")
 
+_PATIENCE = 120.0  #: seconds for starting, reading and writing, whatever the deadline of a filter
+
 
 class MeshLabError(ImgquadError):
     """A filter of MeshLab failed, crashed or did not end in time."""
@@ -87,7 +89,7 @@ class MeshLabProcess:
             assert self._process.stdin is not None
             self._process.stdin.write(line)
             self._process.stdin.flush()
-            answer = self._answers.get(timeout=self.deadline)
+            answer = self._answers.get(timeout=self.deadline if do == "apply" else max(self.deadline, _PATIENCE))
         except queue.Empty:
             self._process.kill()
             raise MeshLabError(
@@ -153,7 +155,7 @@ class MeshLabProcess:
         """Set points (``move``), a value a face (``set_scalar``) or a colour a face (``set_color``), in place."""
         path = self._file("npy")
         np.save(path, values)
-        self.ask(do, file=str(path))
+        self.ask("give", what=do, file=str(path))
 
     def last_good(self) -> Layer | None:
         """Return the current layer as it was before the filter that failed, or None."""

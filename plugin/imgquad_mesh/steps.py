@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.assembly import assemble_mesh
 from imgquad_core.boundary import ExtractionOptions, extract_boundaries
 from imgquad_core.denoise import DenoiseOptions, list_removed, remove_noise
 from imgquad_core.errors import InputError
@@ -18,13 +17,14 @@ from imgquad_core.meshing import MeshingOptions, mesh_boundaries
 from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
 from imgquad_core.pipeline import MeshOptions, run
 from imgquad_core.quality import aspect, corner_angles, material_areas, quad_areas, quality_report, scaled_jacobian
-from imgquad_core.segmentation import SegmentationOptions
-from imgquad_core.selection import Box, crop_image, drop_materials
+from imgquad_core.reading import ReadOptions, read_picture
+from imgquad_core.segmentation import SegmentationOptions, segment_picture
+from imgquad_core.selection import Box, crop_image, drop_materials, material_number
 from imgquad_core.sets import fe_mesh
 from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
 
 from imgquad_mesh.crosscheck import boundary_lengths, material_perimeters
-from imgquad_mesh.files import check_target, mesh_extensions, write_labels, write_mesh_file
+from imgquad_mesh.files import check_target, mesh_extensions, read_vti, write_labels, write_mesh_file
 from imgquad_mesh.layer import Layer, polyline
 from imgquad_mesh.meshlab import face_materials, quad_layer, quad_mesh
 
@@ -95,6 +95,14 @@ class State:
     pixel_boundary: BoundaryGraph | None = None
     boundary: BoundaryGraph | None = None
     made: dict[int, QuadMesh] = field(default_factory=dict)  # meshes of ours by the id of their layer
+
+    def need_image(self) -> Any:
+        """Return the picture: its path, or what it was read to."""
+        if self.image is None:
+            raise InputError("there is no picture; give one as input")
+        if isinstance(self.image, (str, Path)) and Path(self.image).suffix.lower() == ".vti":
+            self.image = read_vti(Path(self.image), ReadOptions.max_pixels)
+        return self.image
 
     def need_labels(self) -> LabelImage:
         """Return the labelled picture; the picture is segmented with the defaults where no filter has done it."""
@@ -182,13 +190,10 @@ class LabelFileOptions:
 
 
 def _segment(state: State, options: SegmentationOptions) -> dict[str, Any]:
-    from imgquad_core.pipeline import segment_source
-
-    if state.image is None:
-        raise InputError("there is no picture; give one as input")
-    found = segment_source(state.image, options)
+    image = state.need_image()
+    found = segment_picture(read_picture(image) if isinstance(image, (str, Path)) else image, options)
     state.put_labels(found.image)
-    return _label_counts(found.image)
+    return {"note": found.note, **_label_counts(found.image)}
 
 
 def _label_counts(image: LabelImage) -> dict[str, Any]:
@@ -222,8 +227,18 @@ def _extract(state: State, options: ExtractionOptions) -> dict[str, Any]:
 
 
 def _smooth(state: State, options: SmoothingOptions) -> dict[str, Any]:
-    state.boundary = smooth_boundaries(state.need_pixel_boundary(), options)
+    state.boundary = smooth_boundaries(state.need_pixel_boundary(), _numbered(options, state))
     return _put_boundary(state, state.boundary, "smoothed boundary")
+
+
+O = TypeVar("O", SmoothingOptions, MeshingOptions)
+
+
+def _numbered(options: O, state: State) -> O:
+    """Return the options with materials by number, which scripts may call by name."""
+    materials = state.need_labels().materials
+    sizes = {material_number(materials, name): size for name, size in (options.material_sizes or {}).items()}
+    return replace(options, material_sizes=sizes or None)
 
 
 def _put_boundary(state: State, graph: BoundaryGraph, label: str) -> dict[str, Any]:
@@ -236,15 +251,13 @@ def _mesh_boundary(state: State, options: MeshingOptions) -> dict[str, Any]:
         smoothing = SmoothingOptions(size=options.size, growth=options.growth, material_sizes=options.material_sizes)
         _smooth(state, smoothing)
     assert state.boundary is not None
-    mesh = mesh_boundaries(state.boundary, options, state.need_labels().materials)
+    mesh = mesh_boundaries(state.boundary, _numbered(options, state), state.need_labels().materials)
     state.put_mesh(mesh)
     return _size_of(mesh)
 
 
 def _mesh_image(state: State, options: MeshOptions) -> dict[str, Any]:
-    if state.image is None:
-        raise InputError("there is no picture; give one as input")
-    done = run(state.labels if state.labels is not None else state.image, options)
+    done = run(state.labels if state.labels is not None else state.need_image(), options)
     state.labels, state.pixel_boundary, state.boundary = done.labels, done.pixel_boundary, done.boundary
     state.put_mesh(done.mesh)
     return _size_of(done.mesh)

@@ -49,10 +49,6 @@ def _write_sizes(sizes: Mapping[Any, float] | None) -> str:
     return _joined(f"{name}={size!r}" for name, size in (sizes or {}).items())
 
 
-def _whole_sizes(text: str) -> dict[int, float]:
-    return {int(command.number(name)): size for name, size in _sizes(text).items()}
-
-
 _LENGTH_OR_AUTO = Text(lambda text: None if text == "auto" else command.number(text), lambda v: "auto" if v is None else repr(v))
 
 #: by name of the field

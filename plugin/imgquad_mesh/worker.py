@@ -122,24 +122,33 @@ def _set_current(pymeshlab: Any, meshes: Any, mesh: int) -> None:
     meshes.set_current_mesh(mesh)
 
 
-def _move(pymeshlab: Any, meshes: Any, file: str) -> None:
-    """Put the points elsewhere, in place: selections, colours and values stay."""
-    names = {}
-    for axis, values in zip("xyz", np.load(file).T, strict=True):
-        names[axis] = _free_name("moved")
-        meshes.current_mesh().add_vertex_custom_scalar_attribute(np.ascontiguousarray(values), names[axis])
-    meshes.compute_coord_by_function(**names, onselected=False)
+def give(meshes: Any, do: str, values: Array) -> None:
+    """Change the current mesh in place, so that selections and all else stay.
+
+    Parameters
+    ----------
+    meshes : pymeshlab.MeshSet
+        What has the mesh.
+    do : str
+        ``move``: put the points elsewhere, shape (n_points, 3). ``set_scalar``: a value a face, shape (n_faces,).
+        ``set_color``: a colour a face (RGBA), shape (n_faces, 4).
+    values : ndarray
+        In the order of the mesh's points, or of its polygons.
+    """
+    if do == "move":
+        names = {axis: _free_name("moved") for axis in "xyz"}
+        for name, column in zip(names.values(), values.T, strict=True):
+            meshes.current_mesh().add_vertex_custom_scalar_attribute(np.ascontiguousarray(column), name)
+        meshes.compute_coord_by_function(**names, onselected=False)
+    elif do == "set_scalar":
+        meshes.compute_scalar_by_function_per_face(q=_attribute(meshes, values), onselected=False)
+    else:
+        channels = {c: _attribute(meshes, column) for c, column in zip("rgba", values.T, strict=True)}
+        meshes.compute_color_by_function_per_face(**channels, onselected=False)
 
 
-def _set_scalar(pymeshlab: Any, meshes: Any, file: str) -> None:
-    """Give each face a value, in place."""
-    meshes.compute_scalar_by_function_per_face(q=_attribute(meshes, np.load(file)), onselected=False)
-
-
-def _set_color(pymeshlab: Any, meshes: Any, file: str) -> None:
-    """Give each face a colour (RGBA), in place."""
-    names = {c: _attribute(meshes, values) for c, values in zip("rgba", np.load(file).T, strict=True)}
-    meshes.compute_color_by_function_per_face(**names, onselected=False)
+def _give(pymeshlab: Any, meshes: Any, what: str, file: str) -> None:
+    give(meshes, what, np.load(file))
 
 
 def _attribute(meshes: Any, values: Array) -> str:
@@ -166,9 +175,7 @@ _REQUESTS: Mapping[str, Callable[..., Any]] = {
     "save": _save,
     "export": _export,
     "set_current": _set_current,
-    "move": _move,
-    "set_scalar": _set_scalar,
-    "set_color": _set_color,
+    "give": _give,
 }
 
 if __name__ == "__main__":
