@@ -99,7 +99,7 @@ class MeshingOptions:
 
     def face_sizes(self, labels: NDArray[np.int32]) -> Points:
         """Return the edge length asked for in each face."""
-        sizes = np.full(len(labels), self.size)
+        sizes = np.full(len(labels), float(self.size))
         for label, size in self._sizes().items():
             sizes[labels == label] = size
         return sizes

@@ -228,7 +228,7 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     """
     options = options or MeshOptions()
     timed = _Stopwatch(progress)
-    raw = timed("read", _read, source, options)
+    raw = timed("read", read_source, source, ReadOptions(max_pixels=options.max_pixels))
     found = timed("segment", segment_picture, raw, options.segmentation())
     picture = crop_image(found.image, options.crop) if options.crop else found.image
     noise = options.noise(found.quantised, found.image.shape)
@@ -253,6 +253,18 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     )
 
 
+def read_source(source: Source, options: ReadOptions | None = None) -> Picture | NDArray[Any] | LabelImage:
+    """Return the picture that a path names; arrays and `LabelImage` as they are."""
+    if isinstance(source, (str, Path)):
+        return read_picture(source, options)
+    return source if isinstance(source, LabelImage) else np.asarray(source)
+
+
+def segment_source(source: Source, options: SegmentationOptions | None = None) -> Segmentation:
+    """Read and segment a picture, and tell what was chosen."""
+    return segment_picture(read_source(source), options)
+
+
 class _Stopwatch:
     """Runs one stage after the other and keeps their times."""
 
@@ -267,12 +279,6 @@ class _Stopwatch:
         result = work(*values)
         self.seconds[stage] = perf_counter() - start
         return result
-
-
-def _read(source: Source, options: MeshOptions) -> Picture | NDArray[Any] | LabelImage:
-    if isinstance(source, (str, Path)):
-        return read_picture(source, ReadOptions(max_pixels=options.max_pixels))
-    return source if isinstance(source, LabelImage) else np.asarray(source)
 
 
 def _assert_feasible(image: LabelImage, options: SmoothingOptions) -> None:
