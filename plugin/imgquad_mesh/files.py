@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,7 @@ from imgquad_core.errors import InputError
 if TYPE_CHECKING:
     from imgquad_core.model import LabelImage, QuadMesh
     from imgquad_core.pipeline import Run
+    from imgquad_mesh.elements import ElementOptions
 
 #: formats that PyVista writes
 GRID_EXTENSIONS = (".vtu", ".vtk")
@@ -44,17 +47,21 @@ def mesh_extensions() -> tuple[str, ...]:
     return (*GRID_EXTENSIONS, *sorted(WRITERS))
 
 
-def write_mesh_file(mesh: QuadMesh, path: Path, **options: Any) -> None:
-    """Write `mesh` in the format that the extension of `path` names."""
+def write_mesh_file(mesh: QuadMesh, path: Path, elements: ElementOptions | None = None, **options: Any) -> None:
+    """Write `mesh`, as the `elements` asked for, in the format that the extension of `path` names."""
+    from imgquad_mesh.elements import make_elements
+
+    made = make_elements(mesh, elements) if elements and not elements.plain else None
     if path.suffix.lower() in GRID_EXTENSIONS:
         from imgquad_mesh.convert import to_grid
+        from imgquad_mesh.writers import to_fe_grid
 
-        grid = to_grid(mesh)
+        grid = to_fe_grid(made) if made else to_grid(mesh)
         replace_file(path, lambda temporary: save_dataset(grid, temporary))
     else:
         from imgquad_core.writers import write_mesh
 
-        write_mesh(mesh, path, **options)
+        write_mesh(made or mesh, path, **options)
 
 
 def write_labels(image: LabelImage, path: Path) -> None:
@@ -110,7 +117,8 @@ def save_dataset(dataset: Any, path: Path) -> None:
 
     writers = {".vtu": vtkXMLUnstructuredGridWriter, ".vtp": vtkXMLPolyDataWriter}
     if path.suffix.lower() not in writers:
-        dataset.save(path)
+        with silent_vtk():
+            dataset.save(path)
         return
     writer = writers[path.suffix.lower()]()
     writer.SetInputData(dataset)
@@ -123,24 +131,39 @@ def save_dataset(dataset: Any, path: Path) -> None:
 def read_vti(path: Path, max_pixels: int) -> NDArray[Any]:
     """Return the picture in a file of VTK's image data, the top row first."""
     import pyvista as pv
+    from pyvista.core.errors import MissingDataError
 
     from imgquad_mesh.convert import image_array
 
     if not path.is_file():
         raise InputError(f"cannot open the picture {path}: there is no such file")
     try:
-        reader = pv.XMLImageDataReader(str(path))
-        with pv.vtk_verbosity("off"):
-            image = reader.read()
-        if image.n_points > max_pixels:
-            raise InputError(
-                f"{path} has {image.n_points} pixels, more than {max_pixels}: crop it, or raise max_pixels"
-            )
+        with silent_vtk():
+            image = pv.XMLImageDataReader(str(path)).read()
+            damaged = image.n_points == 0
+    except Exception as error:  # VTK's own texts are many lines long
+        raise InputError(f"{path} cannot be read as VTK image data: save it anew") from error
+    if damaged:
+        raise InputError(f"{path} has no pixels, or is damaged: save it anew")
+    if image.n_points > max_pixels:
+        raise InputError(f"{path} has {image.n_points} pixels, more than max_pixels = {max_pixels}: raise max_pixels")
+    try:
         return image_array(image)
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(f"{path} cannot be read as VTK image data ({error}): save it anew") from error
+    except (KeyError, MissingDataError) as error:
+        raise InputError(f"{path}: {error}; save it with an array of labels, greys or colours") from error
+
+
+@contextmanager
+def silent_vtk() -> Iterator[None]:
+    """Keep VTK and PyVista from printing what the errors raised here say in one line."""
+    import pyvista as pv
+
+    logging.disable(logging.CRITICAL)
+    try:
+        with pv.vtk_verbosity("off"):
+            yield
+    finally:
+        logging.disable(logging.NOTSET)
 
 
 def _save_labels(image: LabelImage, path: Path) -> None:

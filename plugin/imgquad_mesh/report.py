@@ -50,7 +50,7 @@ def build_report(
 
 def notes(run: Run) -> Iterator[str]:
     """Say in words what was decided by itself, what was removed, and what the user may want to change."""
-    yield run.segmentation.text
+    yield run.segmentation.note
     if run.noise.removes:
         limits = f"clusters below {run.noise.min_pixels} pixels and shorter than {run.noise.min_length:g} px"
         removed = sum(removal.clusters for removal in run.removed)

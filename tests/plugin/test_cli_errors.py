@@ -56,6 +56,11 @@ def image_data(shape: tuple[int, int, int], filled: bool) -> Callable[[Path], Pa
     return write
 
 
+def cut_off_vti(folder: Path) -> Path:
+    whole = image_data((40, 40, 1), True)(folder).read_bytes()
+    return file("image.vti", whole[: len(whole) // 2])(folder)
+
+
 def bomb(folder: Path) -> Path:
     Image.new("1", (30000, 30000)).save(folder / "bomb.png")
     return folder / "bomb.png"
@@ -72,7 +77,8 @@ BAD_PICTURES: dict[str, tuple[Callable[[Path], Path], str]] = {
     "stack": (array(np.stack([LABELS] * 9)), "stack"),
     "strings": (array([["a", "b"]]), "array.npy"),
     "stack of pages": (tiff_stack, "stack"),
-    "broken vti": (file("broken.vti", b"<VTKFile"), "broken.vti"),
+    "no vti": (file("broken.vti", b"<VTKFile"), "broken.vti"),
+    "cut off vti": (cut_off_vti, "image.vti"),
     "vti without data": (image_data((4, 4, 1), False), "No data"),
     "vti volume": (image_data((4, 4, 4), True), "stack"),
     "decompression bomb": (bomb, "max_pixels"),

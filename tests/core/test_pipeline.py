@@ -1,0 +1,204 @@
+"""The whole chain on label pictures of every kind: what comes out is always a valid mesh of the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import imgquad_core
+from imgquad_core.errors import InputError, QualityError
+from imgquad_core.ledger import material_ledger, region_errors
+from imgquad_core.model import VOID, LabelImage, Materials
+from imgquad_core.pipeline import STAGES, MeshOptions, mesh_image, run
+from imgquad_core.quality import quality_report, require_quality
+from imgquad_core.selection import crop_image, drop_materials, material_number
+from invariants import assert_valid_mesh
+
+Labels = NDArray[np.int32]
+
+
+def label_image(labels: Any) -> LabelImage:
+    labels = np.asarray(labels, np.int32)
+    numbers = np.unique(labels[labels != VOID])
+    colors = np.stack([numbers * 37 % 256] * 3, axis=-1)
+    return LabelImage(labels, Materials(numbers, tuple(f"m{n}" for n in numbers), colors))
+
+
+def stripes(rows: int, cols: int, seed: int) -> Labels:
+    return np.asarray((np.arange(cols) // (1 + seed % 3) + np.zeros((rows, 1))) % 3, np.int32)
+
+
+def checkerboard(rows: int, cols: int, seed: int) -> Labels:
+    return np.asarray(np.add.outer(np.arange(rows), np.arange(cols)) % 2, np.int32)
+
+
+def speckles(rows: int, cols: int, seed: int) -> Labels:
+    return (np.random.default_rng(seed).random((rows, cols)) < 0.08).astype(np.int32)
+
+
+def noise(rows: int, cols: int, seed: int) -> Labels:
+    return np.random.default_rng(seed).integers(0, 1 + seed % 8, (rows, cols)).astype(np.int32)
+
+
+def patches(rows: int, cols: int, seed: int) -> Labels:
+    rng = np.random.default_rng(seed)
+    coarse = rng.integers(0, 4, (rows // 5 + 1, cols // 5 + 1))
+    return np.kron(coarse, np.ones((5, 5), int))[:rows, :cols].astype(np.int32)
+
+
+def spiral(rows: int, cols: int, seed: int) -> Labels:
+    y, x = np.mgrid[:rows, :cols] - np.array([rows / 2, cols / 2])[:, None, None]
+    turn = np.hypot(x, y) / (2 + seed % 3) - np.arctan2(y, x) / np.pi
+    return (np.floor(turn) % 2).astype(np.int32)
+
+
+MAKERS: list[Callable[[int, int, int], Labels]] = [stripes, checkerboard, speckles, noise, patches, spiral]
+
+pictures = st.builds(
+    lambda make, rows, cols, seed: make(rows, cols, seed),
+    st.sampled_from(MAKERS),
+    st.integers(1, 30),
+    st.integers(1, 30),
+    st.integers(0, 10_000),
+)
+quickly = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+
+
+@quickly
+@given(pictures, st.sampled_from([1.0, 2.5, 6.0]))
+def test_any_label_picture_gives_a_valid_mesh(labels: Labels, size: float) -> None:
+    image = label_image(labels)
+    assert_valid_mesh(mesh_image(image, MeshOptions(size=size)), image)
+
+
+@quickly
+@given(pictures, st.integers(0, 3), st.booleans(), st.permutations(range(8)))
+def test_turned_mirrored_and_renumbered_pictures_are_meshed_as_well(
+    labels: Labels, turns: int, mirror: bool, order: list[int]
+) -> None:
+    changed = np.rot90(np.asarray(order, np.int32)[labels], turns)
+    image = label_image(changed[:, ::-1] if mirror else changed)
+    assert_valid_mesh(mesh_image(image, MeshOptions(size=2.5)), image)
+
+
+@quickly
+@given(pictures, st.integers(0, 7))
+def test_void_is_left_out(labels: Labels, void: int) -> None:
+    image = label_image(np.where(labels == void, VOID, labels))
+    if (image.labels == VOID).all():
+        with pytest.raises(InputError, match="no pixel is left"):
+            mesh_image(image)
+        return
+    assert_valid_mesh(mesh_image(image, MeshOptions(size=2.5)), image)
+
+
+@pytest.mark.parametrize("effort", ["fast", "normal", "best"])
+def test_every_effort_is_valid_and_the_same_with_two_threads(effort: str) -> None:
+    image = label_image(patches(60, 80, 5))
+    one = mesh_image(image, MeshOptions(size=2, effort=effort))
+    two = mesh_image(image, MeshOptions(size=2, effort=effort, threads=2))
+    assert_valid_mesh(one, image)
+    assert one.points.tobytes() == two.points.tobytes()
+    assert one.quads.tobytes() == two.quads.tobytes()
+
+
+def disc(radius: float = 20.0, side: int = 60) -> LabelImage:
+    y, x = np.mgrid[:side, :side] + 0.5 - side / 2
+    return label_image(np.hypot(x, y) < radius)
+
+
+def test_area_of_every_material_is_that_of_its_pixels() -> None:
+    made = run(disc(), MeshOptions(size=3))
+    for row in material_ledger(made.picture, made.labels, made.boundary, made.mesh):
+        assert row.mesh_area == pytest.approx(row.clean_pixels, rel=1e-3)
+        assert row.boundary_area == pytest.approx(row.mesh_area, rel=1e-9)
+    errors = region_errors(made.boundary)
+    assert (errors.regions, errors.small_regions) == (2, 0)
+    assert errors.worst_error < 1e-3
+
+
+def test_elements_have_the_size_asked_for() -> None:
+    for size in (2.0, 4.0):
+        mesh = mesh_image(label_image(np.zeros((80, 120))), MeshOptions(size=size))
+        assert mesh.n_quads == pytest.approx(80 * 120 / size**2, rel=0.15)
+
+
+def test_mesh_is_in_the_unit_of_the_pixel_size() -> None:
+    plain, scaled = (run(disc(), MeshOptions(pixel_size=s)).mesh for s in (1.0, 0.25))
+    assert np.allclose(scaled.points, plain.points / 4)
+    assert_valid_mesh(scaled, disc(), pixel_size=0.25)
+
+
+def test_run_keeps_all_values_and_times_and_tells_of_progress() -> None:
+    told = []
+    made = run(disc(), progress=lambda stage, number, total: told.append((stage, number, total)))
+    assert told == [(stage, i, len(STAGES)) for i, stage in enumerate(STAGES)]
+    assert tuple(made.seconds) == STAGES
+    assert len(made.boundary.region_label) == len(made.pixel_boundary.region_label) == 2
+
+
+def test_noise_goes_when_it_is_asked_to() -> None:
+    labels = disc().labels.copy()
+    labels[5, 5] = 2
+    image = label_image(labels)
+    assert set(np.unique(mesh_image(image).quad_material)) == {0, 1, 2}  # labels are taken at their word
+    made = run(image, MeshOptions(min_pixels=4))  # the other limit follows
+    assert set(np.unique(made.mesh.quad_material)) == {0, 1}
+    assert [(r.material, r.clusters, r.pixels) for r in made.removed] == [(2, 1, 1)]
+    assert_valid_mesh(made.mesh, made.labels)
+
+
+def test_array_and_label_image_give_the_same_mesh() -> None:
+    of_array, of_image = mesh_image(disc().labels), mesh_image(disc())
+    assert np.array_equal(of_array.points, of_image.points)
+    assert np.array_equal(of_array.quads, of_image.quads)
+
+
+def test_asked_limit_that_is_not_met_names_the_places_and_keeps_the_mesh() -> None:
+    mesh = mesh_image(disc())
+    require_quality(mesh, quality_report(mesh).min_sj - 1e-9)
+    with pytest.raises(QualityError, match=r"scaled Jacobian below 1.*at \(.*m[01] \| m[01]") as caught:
+        require_quality(mesh, 1.0)
+    assert caught.value.mesh is mesh
+    assert len(caught.value.worst) == 5
+
+
+def test_too_many_quads_are_refused_before_the_work() -> None:
+    with pytest.raises(InputError, match="larger size"):
+        mesh_image(label_image(np.zeros((2000, 2000))), MeshOptions(size=0.05))
+
+
+@pytest.mark.parametrize(
+    "bad", [{"pixel_size": 0}, {"size": -1}, {"policy": "luck"}, {"effort": "x"}, {"min_pixels": -1}]
+)
+def test_bad_options_are_refused_at_once(bad: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=f"{next(iter(bad))}"):
+        MeshOptions(**bad)
+
+
+def test_materials_are_found_by_name_and_number() -> None:
+    materials = Materials(np.array([3, 7, 9]), ("quartz", "9", "mica"), np.zeros((3, 3)))
+    assert [material_number(materials, m) for m in ("quartz", "3", 3, "9", 7)] == [3, 3, 3, 7, 7]
+    with pytest.raises(InputError, match=r"gold.*3 \(quartz\), 7 \(9\), 9 \(mica\)"):
+        material_number(materials, "gold")
+
+
+def test_crop_and_drop() -> None:
+    image = label_image(np.arange(12).reshape(3, 4))
+    assert crop_image(image, (1, 0, 3, 2)).labels.tolist() == [[1, 2], [5, 6]]
+    with pytest.raises(InputError, match="4 x 3 pixels"):
+        crop_image(image, (0, 0, 5, 1))
+    assert drop_materials(image, [1, "m3"]).labels[0].tolist() == [0, VOID, 2, VOID]
+    assert drop_materials(image, []) is image
+
+
+def test_lazy_names_of_the_package() -> None:
+    assert imgquad_core.MeshOptions is MeshOptions
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = imgquad_core.nothing
