@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from handmade import disk, jiggle, staircase
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import KINDS, FEMesh, Names
 from imgquad_core.model import VOID
 from imgquad_core.sets import fe_mesh
-
-from handmade import disk, jiggle, staircase
 
 THREE = np.array([[0, 0, 1, 1], [0, 0, 1, 1], [2, 2, 2, 2]])
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from handmade import disk, jiggle, staircase
 from imgquad_core.errors import InputError
 from imgquad_core.sets import fe_mesh
 from imgquad_core.writers import write_mesh
-
-from handmade import disk, jiggle, staircase
 
 MESH = staircase(disk(8, 3), ("matrix", "Ein Kreis!"), jiggle)
 STEEL = {"*": {"young": 210e9, "poisson": 0.3, "conductivity": 50.0}}

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from handmade import disk, jiggle_beside, staircase
 from imgquad_core.errors import InputError
 from imgquad_core.sets import fe_mesh
 from imgquad_core.writers import write_mesh
-
-from handmade import disk, jiggle_beside, staircase
 
 LAYERS = staircase(np.repeat([0, 1], 4)[None, :].repeat(6, axis=0), ("quartz", "feldspar"), jiggle_beside(0, 4))
 SETS = {"left", "right", "bottom", "top", "interface_quartz_feldspar"}

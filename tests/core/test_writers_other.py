@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from handmade import disk, jiggle, staircase
 from imgquad_core.errors import InputError
 from imgquad_core.sets import fe_mesh
 from imgquad_core.writers import WRITERS, write_mesh, writer_for
-
-from handmade import disk, jiggle, staircase
 
 PICTURE = disk(10, 3.5)
 PICTURE[0, :] = 2

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from imgquad_core.errors import InputError
+from imgquad_mesh.cli.fe import add_element_options, element_options, writer_options
 from imgquad_mesh.cli.options import add_mesh_options, mesh_options, number
 
 if TYPE_CHECKING:
     from imgquad_core.pipeline import MeshOptions, Run
+    from imgquad_mesh.elements import ElementOptions
 
 
 def add_parser(subparsers: Any) -> None:
@@ -22,6 +24,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("image", type=Path, metavar="IMAGE", help="PNG, JPEG, TIFF, BMP, PPM, PGM, NPY or VTI")
     parser.add_argument("output", type=Path, metavar="OUTPUT", help="file of the mesh; its extension tells the format")
     add_mesh_options(parser)
+    add_element_options(parser)
     group = parser.add_argument_group("output")
     group.add_argument("--labels-out", type=Path, metavar="FILE", help="materials as meshed: .npy or .png")
     group.add_argument("--boundaries-out", type=Path, metavar="FILE", help="smoothed boundaries: .vtp")
@@ -60,14 +63,31 @@ class Outputs:
             raise InputError(f"two outputs have one name: {', '.join(map(str, targets.values()))}")
 
 
+@dataclass(frozen=True)
+class Writing:
+    """Which elements the mesh is made of, and the options of its writer."""
+
+    elements: ElementOptions | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
 def execute(args: argparse.Namespace) -> int:
     """Mesh the picture that `args` names; return the exit code."""
     outputs = Outputs(args.output, args.labels_out, args.boundaries_out, args.report, args.picture)
-    return mesh_to_files(args.image, mesh_options(args), outputs, quiet=args.quiet, min_quality=args.min_quality)
+    writing = Writing(element_options(args), writer_options(args))
+    return mesh_to_files(
+        args.image, mesh_options(args), outputs, writing, quiet=args.quiet, min_quality=args.min_quality
+    )
 
 
 def mesh_to_files(
-    image: Path, options: MeshOptions, outputs: Outputs, *, quiet: bool = False, min_quality: float | None = None
+    image: Path,
+    options: MeshOptions,
+    outputs: Outputs,
+    writing: Writing | None = None,
+    *,
+    quiet: bool = False,
+    min_quality: float | None = None,
 ) -> int:
     """Mesh a picture, write what is asked for, print the report; return the exit code.
 
@@ -89,7 +109,7 @@ def mesh_to_files(
         run = _run(image, options, progress)
         wrote = perf_counter()
         progress("write", len(run.seconds), len(run.seconds) + 1)
-        _write(run, outputs)
+        _write(run, outputs, writing or Writing())
     now = perf_counter()
     seconds = {**run.seconds, "write": now - wrote, "total": now - start}
     report = build_report(run, image, outputs.mesh, seconds, min_quality)
@@ -112,7 +132,7 @@ def _run(image: Path, options: MeshOptions, progress: Callable[[str, int, int], 
     return run(read_vti(image, options.max_pixels), options, progress)
 
 
-def _write(run: Run, outputs: Outputs) -> None:
+def _write(run: Run, outputs: Outputs, writing: Writing) -> None:
     from imgquad_mesh import files
 
     if outputs.labels:
@@ -121,4 +141,4 @@ def _write(run: Run, outputs: Outputs) -> None:
         files.write_boundaries(run, outputs.boundaries)
     if outputs.picture:
         files.write_picture(run.mesh, outputs.picture)
-    files.write_mesh_file(run.mesh, outputs.mesh)
+    files.write_mesh_file(run.mesh, outputs.mesh, writing.elements, **writing.options)
