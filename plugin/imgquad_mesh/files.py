@@ -8,6 +8,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -168,7 +169,9 @@ def silent_vtk() -> Iterator[None]:
 
 def _save_labels(image: LabelImage, path: Path) -> None:
     if path.suffix.lower() == ".npy":
-        np.save(path, image.labels)
+        whole = BytesIO()  # np.save into a file overlooks that a disk is full
+        np.save(whole, image.labels)
+        path.write_bytes(whole.getbuffer())
         return
     from PIL import Image
 

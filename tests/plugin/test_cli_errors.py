@@ -198,7 +198,7 @@ def test_full_disk(name: str, picture: Path, tmp_path: Path) -> None:
     assert_refused(done.returncode, done.stderr.splitlines()[-1] + "\n", name, kept)
 
 
-@pytest.mark.parametrize("flag", ["--labels-out=x.npy", "--boundaries-out=x.vtp", "--report=x.json", "--picture=x.png"])
+@pytest.mark.parametrize("flag", ["--labels-out=x.npy", "--boundaries-out=x.vtp", "--picture=x.png"])
 def test_full_disk_for_a_second_output(flag: str, picture: Path, tmp_path: Path) -> None:
     option, name = flag.split("=")
     kept = tmp_path / name
