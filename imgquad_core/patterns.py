@@ -105,15 +105,14 @@ def choose_cut(points: Points, loop: Ids, corner: Ids, length: Ids, n: int, edge
             for b in range(1, length[j % n]):
                 w = loop[(corner[j % n] + b) % n_loop]
                 ideal = np.hypot(points[u, 0] - points[w, 0], points[u, 1] - points[w, 1]) / edge
-                if abs(ideal - max(1.0, ideal)) >= score:
-                    continue
                 l = max(1, int(np.floor(ideal + 0.5)))
                 around = b + length[i] - a
                 for k in range(i + 1, j):
                     around += length[k]
                 if (l + around) % 2 == 1:  # the outline of each piece must be even
                     l = l + 1 if l < ideal or l == 1 else l - 1
-                if abs(l - ideal) >= score:
+                p = length[i] - a
+                if abs(l - ideal) >= score or (apart == 1 and not abs(p - b) < l < p + b):  # no triangle
                     continue
                 _cut_sides(length, n, i, j, a, b, l, one, two)
                 if piece_fits(one, apart + 2) and piece_fits(two, n - apart + 2):

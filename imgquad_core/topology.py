@@ -41,7 +41,6 @@ TRIAL_SWEEPS = 5
 SMALLEST_SHARE, LARGEST_SHARE = 0.15, 4.0  # of a new quad's area in the mean of the cavity
 FEWEST, MOST = 0.7, 1.4  # new quads per old quad
 RETRY = 1.3  # a cavity this much larger than the last failed one is tried again at the same gain
-MAX_GROWTH_STEPS = 200
 
 
 class CleanUp(NamedTuple):
@@ -70,18 +69,24 @@ class _Net(NamedTuple):
 
 
 class _Cavity(NamedTuple):
-    """Scratch of one cavity."""
+    """Scratch of one cavity, whose outline is kept up to date quad by quad."""
 
     members: Ids  # quads
     in_cavity: Ids  # stamp of each quad
     seen: Ids  # stamp of each node of the cavity
     inside: Ids  # cavity quads at each node of the cavity
-    on_loop: Ids  # stamp of each node of the outline
+    leaving: Ids  # half-edges of the outline that leave each node of the cavity: 1, or 2 at a pinch
+    leave: Ids  # the last one of them
+    doubtful: Ids  # stack of nodes whose need may have changed
     loop: Ids  # outline, counter-clockwise
-    edge: Ids  # half-edge of the cavity that leaves each outline node
+    edge: Ids  # half-edge of the outline that leaves each of its nodes
     corner: Ids  # places of the corners in the outline
     length: Ids  # edges between corners
-    count: Ids  # [members, outline, corners, stamp]
+    count: Ids  # see below
+
+
+# what _Cavity.count holds
+_MEMBERS, _OUTLINE, _CORNERS, _STAMP, _RIM_EDGES, _COST, _DOUBTFUL = range(7)
 
 
 def clean_up(mesh: FaceQuads, how: CleanUp) -> FaceQuads:
@@ -151,27 +156,25 @@ def _scratch_points(largest: int) -> int:
 
 
 def _scratch(net: _Net, largest: int) -> tuple[_Cavity, Canvas]:
-    n, m, few = len(net.valence), len(net.quads), 4 * largest + 64
+    n, m, few = len(net.valence), len(net.quads), _scratch_points(largest)
+    lists = [np.empty(few, np.int64) for _ in range(8)]
     cavity = _Cavity(
-        np.empty(few, np.int64),
+        lists[0],
         np.zeros(m, np.int64),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
-        np.empty(few, np.int64),
-        np.empty(few, np.int64),
-        np.empty(few, np.int64),
-        np.empty(few, np.int64),
-        np.zeros(4, np.int64),
+        np.zeros(n, np.int64),
+        np.empty(16 * few, np.int64),
+        *lists[1:5],
+        np.zeros(7, np.int64),
     )
     canvas = Canvas(
         net.points,
         n,
         np.empty((few, 4), np.int64),
         np.zeros(2, np.int64),
-        np.empty(few, np.int64),
-        np.empty(few, np.int64),
-        np.empty(few, np.int64),
+        *lists[5:8],
         np.empty(few, np.int64),
         np.empty((few, 3)),
     )
@@ -198,116 +201,118 @@ def _penalty(valence: int, wanted: int, rim: bool) -> int:
 
 @kernel
 def _add_quad(net: _Net, cavity: _Cavity, q: int) -> None:
-    """Put quad q into the cavity."""
-    stamp = cavity.count[3]
-    if cavity.in_cavity[q] == stamp:
+    """Put quad q into the cavity and bring the outline up to date."""
+    count = cavity.count
+    stamp = count[_STAMP]
+    if cavity.in_cavity[q] == stamp or count[_MEMBERS] == cavity.members.size:
         return
     cavity.in_cavity[q] = stamp
-    if cavity.count[0] < cavity.members.size:
-        cavity.members[cavity.count[0]] = q
-    cavity.count[0] += 1
+    cavity.members[count[_MEMBERS]] = q
+    count[_MEMBERS] += 1
     for k in range(4):
         v = net.quads[q, k]
         if cavity.seen[v] != stamp:
-            cavity.seen[v] = stamp
-            cavity.inside[v] = 0
+            cavity.seen[v], cavity.inside[v], cavity.leaving[v] = stamp, 0, 0
+            count[_COST] += _penalty(net.valence[v], net.wanted[v], net.rim[v])
         cavity.inside[v] += 1
+        cavity.doubtful[count[_DOUBTFUL]] = v
+        count[_DOUBTFUL] += 1
+    for h in range(4 * q, 4 * q + 4):  # the neighbours' edges vanish from the outline ...
+        t = net.twins[h]
+        if t >= 0 and cavity.in_cavity[t >> 2] == stamp:
+            cavity.leaving[net.quads[t >> 2, t & 3]] -= 1
+            count[_RIM_EDGES] -= 1
+    for h in range(4 * q, 4 * q + 4):  # ... and the others of the quad become part of it
+        t = net.twins[h]
+        if t < 0 or cavity.in_cavity[t >> 2] != stamp:
+            v = net.quads[q, h & 3]
+            cavity.leaving[v] += 1
+            cavity.leave[v] = h
+            count[_RIM_EDGES] += 1
 
 
 @kernel
 def _add_ring(net: _Net, cavity: _Cavity, v: int) -> bool:
     """Put all quads at node v into the cavity; return whether that was any."""
-    before = cavity.count[0]
+    before = cavity.count[_MEMBERS]
     for i in range(net.valence[v]):
         _add_quad(net, cavity, net.ring[v, i])
-    return cavity.count[0] > before
-
-
-@kernel
-def _is_outline(net: _Net, cavity: _Cavity, h: int) -> bool:
-    t = net.twins[h]
-    return t < 0 or cavity.in_cavity[t >> 2] != cavity.count[3]
-
-
-@kernel
-def _trace_outline(net: _Net, cavity: _Cavity) -> int:
-    """Trace the cavity's outline; return its length, 0 if quads were added at a pinch, -1 if it is not one loop."""
-    stamp = cavity.count[3]
-    total, start = 0, np.int64(-1)
-    for i in range(cavity.count[0]):
-        for h in range(4 * cavity.members[i], 4 * cavity.members[i] + 4):
-            if _is_outline(net, cavity, h):
-                total += 1
-                if start < 0:
-                    start = h
-    if start < 0 or total > cavity.loop.size:
-        return -1
-    n, h = 0, start
-    while True:
-        v = net.quads[h >> 2, h & 3]
-        if cavity.on_loop[v] == -stamp:  # a pinch: the outline passes the node twice
-            return 0 if _add_ring(net, cavity, v) else -1
-        cavity.on_loop[v] = -stamp
-        cavity.loop[n], cavity.edge[n] = v, h
-        n += 1
-        h = (h & ~3) + ((h + 1) & 3)
-        while not _is_outline(net, cavity, h):
-            t = net.twins[h]
-            h = (t & ~3) + ((t + 1) & 3)
-        if h == start:
-            break
-    return n if n == total else -1
-
-
-@kernel
-def _find_corners(net: _Net, cavity: _Cavity) -> bool:
-    """Find the corners of the outline; return False if a concave node made the cavity grow (or it has to stop)."""
-    n = 0
-    for i in range(cavity.count[1]):
-        v = cavity.loop[i]
-        need = net.wanted[v] - (net.valence[v] - cavity.inside[v])
-        if need >= 3:
-            if not _add_ring(net, cavity, v):
-                cavity.count[1] = -1
-            return False
-        if need <= 1:
-            if n > 0:
-                cavity.length[n - 1] = i - cavity.corner[n - 1]
-            cavity.corner[n] = i
-            n += 1
-    if n > 0:
-        cavity.length[n - 1] = cavity.count[1] - cavity.corner[n - 1] + cavity.corner[0]
-    cavity.count[2] = n
-    return True
+    return cavity.count[_MEMBERS] > before
 
 
 @kernel
 def _settle(net: _Net, cavity: _Cavity, largest: int) -> bool:
-    """Grow the cavity until its outline is one loop without concave nodes; return whether it got there."""
-    for _ in range(MAX_GROWTH_STEPS):
-        if cavity.count[0] > largest:
+    """Add quads until no node of the outline is concave or a pinch; return whether that was possible."""
+    count = cavity.count
+    while count[_DOUBTFUL] > 0:
+        if count[_MEMBERS] > largest:
             return False
-        stamp = cavity.count[3]
-        n = _trace_outline(net, cavity)
-        for i in range(min(cavity.count[0], cavity.members.size)):  # take the marks of the loop back
-            for k in range(4):
-                cavity.on_loop[net.quads[cavity.members[i], k]] = 0
-        if n < 0:
+        count[_DOUBTFUL] -= 1
+        v = cavity.doubtful[count[_DOUBTFUL]]
+        if cavity.leaving[v] == 0:
+            continue
+        need = net.wanted[v] - (net.valence[v] - cavity.inside[v])
+        if (cavity.leaving[v] > 1 or need >= 3) and not _add_ring(net, cavity, v):
             return False
-        cavity.count[1] = n
-        if n > 0 and _find_corners(net, cavity):
-            for i in range(n):
-                cavity.on_loop[cavity.loop[i]] = stamp
-            return True
-        if cavity.count[1] < 0:
+    return count[_MEMBERS] <= largest and _trace_outline(net, cavity)
+
+
+@kernel
+def _leaving_edge(net: _Net, cavity: _Cavity, v: int) -> int:
+    """Return the half-edge of the outline that leaves node v."""
+    h = cavity.leave[v]
+    t = net.twins[h]
+    if t < 0 or cavity.in_cavity[t >> 2] != cavity.count[_STAMP]:
+        return h
+    for i in range(net.valence[v]):  # it has become inner: v was a pinch for a while
+        q = net.ring[v, i]
+        if cavity.in_cavity[q] == cavity.count[_STAMP]:
+            for h in range(4 * q, 4 * q + 4):
+                t = net.twins[h]
+                if net.quads[q, h & 3] == v and (t < 0 or cavity.in_cavity[t >> 2] != cavity.count[_STAMP]):
+                    return h
+    return -1
+
+
+@kernel
+def _trace_outline(net: _Net, cavity: _Cavity) -> bool:
+    """Trace the outline and find its corners; return whether it is one loop."""
+    count = cavity.count
+    total = count[_RIM_EDGES]
+    start = np.int64(-1)
+    for i in range(count[_MEMBERS] - 1, -1, -1):
+        for k in range(4):
+            if start < 0 and cavity.leaving[net.quads[cavity.members[i], k]] > 0:
+                start = net.quads[cavity.members[i], k]
+        if start >= 0:
+            break
+    if start < 0 or total > cavity.loop.size:
+        return False
+    n, c, v = 0, 0, start
+    while True:
+        h = _leaving_edge(net, cavity, v)
+        if h < 0 or n == total:
             return False
-    return False
+        cavity.loop[n], cavity.edge[n] = v, h
+        if net.wanted[v] - (net.valence[v] - cavity.inside[v]) <= 1:
+            cavity.corner[c] = n
+            if c > 0:
+                cavity.length[c - 1] = n - cavity.corner[c - 1]
+            c += 1
+        n += 1
+        v = net.quads[h >> 2, (h + 1) & 3]
+        if v == start:
+            break
+    if c > 0:
+        cavity.length[c - 1] = n - cavity.corner[c - 1] + cavity.corner[0]
+    count[_OUTLINE], count[_CORNERS] = n, c
+    return n == total
 
 
 @kernel
 def _push_side(net: _Net, cavity: _Cavity) -> bool:
     """Grow the cavity by the row behind one side: the one with most irregular nodes, then the longest."""
-    n, n_loop, stamp = cavity.count[2], cavity.count[1], cavity.count[3]
+    n, n_loop, stamp = cavity.count[_CORNERS], cavity.count[_OUTLINE], cavity.count[_STAMP]
     best, best_score = -1, -1
     for s in range(n):
         score, blocked = 0, False
@@ -333,38 +338,22 @@ def _push_side(net: _Net, cavity: _Cavity) -> bool:
 @kernel
 def _push_all(net: _Net, cavity: _Cavity) -> bool:
     """Grow the cavity on all sides."""
-    before, n_loop = cavity.count[0], cavity.count[1]
+    before, n_loop = cavity.count[_MEMBERS], cavity.count[_OUTLINE]
     for i in range(n_loop):
         t = net.twins[cavity.edge[i]]
         if t >= 0:
             _add_quad(net, cavity, t >> 2)
-    return cavity.count[0] > before
-
-
-@kernel
-def _cost_now(net: _Net, cavity: _Cavity) -> int:
-    """Irregularity of all nodes of the cavity."""
-    stamp, cost = cavity.count[3], 0
-    for i in range(cavity.count[0]):
-        for k in range(4):
-            v = net.quads[cavity.members[i], k]
-            if cavity.seen[v] == stamp:
-                cost += _penalty(net.valence[v], net.wanted[v], net.rim[v])
-                cavity.seen[v] = -stamp
-    for i in range(cavity.count[0]):
-        for k in range(4):
-            cavity.seen[net.quads[cavity.members[i], k]] = stamp
-    return cost
+    return cavity.count[_MEMBERS] > before
 
 
 @kernel
 def _cost_then(net: _Net, cavity: _Cavity, inner: int) -> int:
     """Irregularity with a pattern that has `inner` irregular nodes, one quad at each corner and two beside sides."""
     cost, c = inner, 0
-    for i in range(cavity.count[1]):
+    for i in range(cavity.count[_OUTLINE]):
         v = cavity.loop[i]
         quads = 2
-        if c < cavity.count[2] and cavity.corner[c] == i:
+        if c < cavity.count[_CORNERS] and cavity.corner[c] == i:
             quads, c = 1, c + 1
         cost += _penalty(net.valence[v] - cavity.inside[v] + quads, net.wanted[v], net.rim[v])
     return cost
@@ -381,7 +370,7 @@ def _area(points: Points, quads: Ids, q: int) -> float:
 
 @kernel
 def _mean_edge(points: Points, cavity: _Cavity) -> float:
-    total, n = 0.0, cavity.count[1]
+    total, n = 0.0, cavity.count[_OUTLINE]
     for i in range(n):
         u, w = cavity.loop[i], cavity.loop[(i + 1) % n]
         total += np.hypot(points[u, 0] - points[w, 0], points[u, 1] - points[w, 1])
@@ -392,13 +381,13 @@ def _mean_edge(points: Points, cavity: _Cavity) -> float:
 def _draw(net: _Net, cavity: _Cavity, canvas: Canvas, kind: int, cut: Ids) -> None:
     """Draw the chosen pattern into the cavity and smooth it."""
     canvas.count[:] = 0
-    n_loop = cavity.count[1]
+    n_loop = cavity.count[_OUTLINE]
     if kind == CUT:
-        draw_cut(canvas, cavity.loop, cavity.corner, cavity.length, cavity.count[2], cut)
+        draw_cut(canvas, cavity.loop, cavity.corner, cavity.length, cavity.count[_CORNERS], cut)
     else:
         for i in range(n_loop):
             canvas.poly[i] = cavity.loop[(cavity.corner[0] + i) % n_loop]
-        draw_piece(canvas, cavity.length, cavity.count[2])
+        draw_piece(canvas, cavity.length, cavity.count[_CORNERS])
     smooth_drawn(canvas, TRIAL_SWEEPS)
 
 
@@ -406,12 +395,12 @@ def _draw(net: _Net, cavity: _Cavity, canvas: Canvas, kind: int, cut: Ids) -> No
 def _is_better(net: _Net, cavity: _Cavity, canvas: Canvas, gain: int, tolerance: float, worst: float) -> bool:
     """Whether the drawn pattern may replace the cavity."""
     old_sum, old_worst, area = 0.0, 1.0, 0.0
-    for i in range(cavity.count[0]):
+    for i in range(cavity.count[_MEMBERS]):
         quality = quad_quality(net.points, net.quads, cavity.members[i])
         old_sum += 1.0 - quality
         old_worst = min(old_worst, quality)
         area += _area(net.points, net.quads, cavity.members[i])
-    need, mean = min(worst, old_worst), area / cavity.count[0]
+    need, mean = min(worst, old_worst), area / cavity.count[_MEMBERS]
     new_sum = 0.0
     for q in range(canvas.count[1]):
         quality = quad_quality(net.points, canvas.quads, q)
@@ -427,13 +416,13 @@ def _is_better(net: _Net, cavity: _Cavity, canvas: Canvas, gain: int, tolerance:
 @kernel
 def _has_room(net: _Net, cavity: _Cavity, kind: int, cut: Ids) -> bool:
     """Whether the pattern has about as many quads as the cavity, and mesh and rings can hold it."""
-    n = cavity.count[2]
+    n = cavity.count[_CORNERS]
     quads = cut_quads(cavity.length, n, cut) if kind == CUT else piece_quads(cavity.length, n)
-    if not FEWEST * cavity.count[0] <= quads <= MOST * cavity.count[0]:
+    if not FEWEST * cavity.count[_MEMBERS] <= quads <= MOST * cavity.count[_MEMBERS]:
         return False
     if quads > net.tops[0] or quads > net.tops[1]:
         return False
-    for i in range(cavity.count[1]):
+    for i in range(cavity.count[_OUTLINE]):
         v = cavity.loop[i]
         if net.valence[v] - cavity.inside[v] + 2 > net.ring.shape[1]:
             return False
@@ -443,19 +432,19 @@ def _has_room(net: _Net, cavity: _Cavity, kind: int, cut: Ids) -> bool:
 @kernel
 def _remove(net: _Net, cavity: _Cavity) -> None:
     """Take the cavity's quads out of the mesh."""
-    stamp = cavity.count[3]
-    for i in range(cavity.count[1]):
+    stamp = cavity.count[_STAMP]
+    for i in range(cavity.count[_OUTLINE]):
         v, n = cavity.loop[i], 0
         for j in range(net.valence[v]):
             if cavity.in_cavity[net.ring[v, j]] != stamp:
                 net.ring[v, n] = net.ring[v, j]
                 n += 1
         net.valence[v] = n
-    for i in range(cavity.count[0]):
+    for i in range(cavity.count[_MEMBERS]):
         q = cavity.members[i]
         for k in range(4):
             v = net.quads[q, k]
-            if cavity.on_loop[v] != stamp and net.valence[v] > 0:
+            if cavity.leaving[v] == 0 and net.valence[v] > 0:
                 net.valence[v] = 0
                 net.free_nodes[net.tops[1]] = v
                 net.tops[1] += 1
@@ -507,15 +496,15 @@ def _join(net: _Net, q: int) -> None:
 @kernel
 def _choose(net: _Net, cavity: _Cavity, cut: Ids, last_gain: int, last_size: int) -> tuple[int, int]:
     """Return (kind of pattern, gain) for the cavity's outline; kind NONE where none helps."""
-    n = cavity.count[2]
+    n = cavity.count[_CORNERS]
     if n < 2 or n > MAX_CORNERS:
         return NONE, 0
     whole = piece_fits(cavity.length, n)
     if not whole and n != 2 and n != 4 and n != 6:
         return NONE, 0
     inner = (0 if n == 4 else 1) if whole else 2
-    gain = _cost_now(net, cavity) - _cost_then(net, cavity, inner)
-    if gain <= 0 or (gain <= last_gain and cavity.count[0] < RETRY * last_size):
+    gain = cavity.count[_COST] - _cost_then(net, cavity, inner)
+    if gain <= 0 or (gain <= last_gain and cavity.count[_MEMBERS] < RETRY * last_size):
         return NONE, 0
     if whole:
         return WHOLE, gain
@@ -532,8 +521,9 @@ def _remesh_around(
     cut: Ids, new_id: Ids, clock: int,
 ) -> bool:
     """Grow a cavity around node `seed` and remesh it; return whether that was done."""
-    cavity.count[3] += 1
-    cavity.count[0] = 0
+    cavity.count[_STAMP] += 1
+    for i in (_MEMBERS, _OUTLINE, _CORNERS, _RIM_EDGES, _COST, _DOUBTFUL):
+        cavity.count[i] = 0
     _add_ring(net, cavity, seed)
     last_gain, last_size = 0, 0
     while _settle(net, cavity, largest):
@@ -546,8 +536,8 @@ def _remesh_around(
                     _remove(net, cavity)
                     _insert(net, canvas, new_id, clock, face)
                     return True
-            last_gain, last_size = gain, cavity.count[0]
-        if cavity.count[2] < 2:
+            last_gain, last_size = gain, cavity.count[_MEMBERS]
+        if cavity.count[_CORNERS] < 2:
             if not _push_all(net, cavity):
                 return False
         elif not _push_side(net, cavity):
