@@ -13,6 +13,7 @@ from imgquad_core.fitting import quadratic_at
 from imgquad_core.jit import kernel
 
 _SIDE = 6.0  # px of arc of each side
+_SIDES = np.array([26.0, 18.0, 12.0, 8.5, _SIDE])  # what is tried to place a corner, as long as both are straight
 _NEAR = 0.4  # px beside the corner that are left out
 _STRAIGHT = 0.32  # px, largest residual (rms) of a side
 _TURN = 0.8  # radians, least turn between the sides
@@ -40,13 +41,20 @@ def find_corners(curves: Curves) -> Flags:
     return is_corner
 
 
-@kernel
 def place_corners(curves: Curves, is_corner: Flags, room: Floats, points: Floats) -> None:
     """Move corners to where the lines of their sides meet, in place, by no more than `room`."""
+    _place(curves, is_corner, room, _SIDES, points)
+
+
+@kernel
+def _place(curves: Curves, is_corner: Flags, room: Floats, lengths: Floats, points: Floats) -> None:
     for c in range(len(curves.ends)):
         for i in range(curves.offsets[c], curves.offsets[c + 1]):
             if is_corner[i]:
-                _, dx, dy = _corner_at(curves, c, i)
+                for far in lengths:
+                    straight, dx, dy = _corner_at(curves, c, i, far)
+                    if straight > 0.0:
+                        break
                 scale = min(1.0, room[i] / max(np.hypot(dx, dy), 1e-9))
                 points[i, 0], points[i, 1] = curves.raw[i, 0] + scale * dx, curves.raw[i, 1] + scale * dy
 
@@ -55,31 +63,31 @@ def place_corners(curves: Curves, is_corner: Flags, room: Floats, points: Floats
 def _find(curves: Curves) -> Flags:
     score = np.zeros(len(curves.raw))
     is_corner = np.zeros(len(curves.raw), np.bool_)
-    x, y, s, sums = np.empty(99), np.empty(99), np.empty(99), np.empty(14)
+    x, y, s, q, sums = np.empty(99), np.empty(99), np.empty(99), np.ones(99), np.empty(14)
     for c in range(len(curves.ends)):
         if curves.is_frame[c]:
             continue
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
         for i in range(first + (curves.ends[c, 0] >= 0), last):
-            straight, dx, dy = _corner_at(curves, c, i)
+            straight, dx, dy = _corner_at(curves, c, i, _SIDE)
             if straight <= 0.0:
                 continue
             n, middle = _gather(curves, c, i, x, y, s)
-            gain = quadratic_at(x[:n], y[:n], s[:n], middle, _SIDE, sums)[2]
+            gain = quadratic_at(x[:n], y[:n], s[:n], q[:n], middle, _SIDE, sums)[2]
             if gain >= _UNLIKE:
                 j = _nearest(curves, c, i, curves.raw[i, 0] + dx, curves.raw[i, 1] + dy)
                 score[j] = max(score[j], gain + straight)
         for i in range(first, last):
             if score[i] > 0.0 and _is_best(curves, c, i, score):
-                is_corner[i] = _corner_at(curves, c, i)[0] > 0.0
+                is_corner[i] = _corner_at(curves, c, i, _SIDE)[0] > 0.0
     return is_corner
 
 
 @kernel
-def _corner_at(curves: Curves, c: int, i: int) -> tuple[float, float, float]:
+def _corner_at(curves: Curves, c: int, i: int, far: float) -> tuple[float, float, float]:
     """How straight the sides of point i are (0: no corner), and the shift to where their lines meet."""
-    n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -1, _NEAR, _SIDE)
-    m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, 1, _NEAR, _SIDE)
+    n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -1, _NEAR, far)
+    m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, 1, _NEAR, far)
     turn = np.pi - abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
     if n < 6 or m < 6 or max(rms_u, rms_v) > _STRAIGHT or turn < _TURN:
         return 0.0, 0.0, 0.0

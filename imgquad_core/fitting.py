@@ -15,19 +15,22 @@ from imgquad_core.curves import Floats, Ints
 from imgquad_core.jit import kernel
 
 WINDOWS = (3.0, 4.5, 6.5, 9.5, 14.0, 20.0, 30.0, 45.0, 65.0)  #: half widths that are tried, px of arc
-STAIR_NOISE = 0.30  #: px; the steps of a digital straight line have a standard deviation of 1 / sqrt(12) = 0.289
+STAIR_NOISE = 0.33  #: px; steps of a digital straight line have a standard deviation of 1 / sqrt(12) = 0.289, in short windows more
 _EVERY = 4  # windows are chosen at every 4th point
+_DARING = 20.0  # wider ones only if the last two did
 _SLOPE = 0.5  # and change by this much a px of arc
 _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are: regression would let them collapse
 
 
 @kernel
-def _sum_up(x: Floats, y: Floats, s: Floats, i: int, w: float, sums: Floats) -> None:
+def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats) -> float:
     """Weighted sums within +-w of point i, with u = s - s[i] and x, y relative to it.
 
-    sums[0:5] of u^0..u^4, [5:8] of x, u x, u^2 x, [8:11] of y, u y, u^2 y, [11:14] of x x, x y, y y.
+    sums[0:5] of u^0..u^4, [5:8] of x, u x, u^2 x, [8:11] of y, u y, u^2 y, [11:14] of x x, x y, y y. Gives the sum of the bell
+    alone, over the samples that count.
     """
     sums[:] = 0.0
+    count = 0.0
     for step in (-1, 1):
         j = i if step == 1 else i - 1
         while 0 <= j < len(s) and abs(s[j] - s[i]) <= w:
@@ -35,6 +38,8 @@ def _sum_up(x: Floats, y: Floats, s: Floats, i: int, w: float, sums: Floats) -> 
             t = u / w
             g = 1.0 - 0.47 * t * t
             g *= g
+            count += g * (q[j] > 0.0)
+            g *= q[j]
             gu, guu = g * u, g * u * u
             sums[0] += g
             sums[1] += gu
@@ -51,6 +56,7 @@ def _sum_up(x: Floats, y: Floats, s: Floats, i: int, w: float, sums: Floats) -> 
             sums[12] += g * px * py
             sums[13] += g * py * py
             j += step
+    return count
 
 
 @kernel
@@ -71,21 +77,21 @@ def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, fl
 
 
 @kernel
-def quadratic_at(x: Floats, y: Floats, s: Floats, i: int, w: float, sums: Floats) -> tuple[float, float, float]:
+def quadratic_at(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats) -> tuple[float, float, float]:
     """Fit around point i: its shift in x and in y, and the root mean square residual across the curve."""
-    _sum_up(x, y, s, i, w, sums)
+    count = _sum_up(x, y, s, q, i, w, sums)
     x0, x1, x2 = _solve(sums, sums[5], sums[6], sums[7])
     y0, y1, y2 = _solve(sums, sums[8], sums[9], sums[10])
     xx = sums[11] - x0 * sums[5] - x1 * sums[6] - x2 * sums[7]
     xy = sums[12] - x0 * sums[8] - x1 * sums[9] - x2 * sums[10]
     yy = sums[13] - y0 * sums[8] - y1 * sums[9] - y2 * sums[10]
     across = (y1 * y1 * xx - 2 * x1 * y1 * xy + x1 * x1 * yy) / (x1 * x1 + y1 * y1 + 1e-300)
-    return x0, y0, np.sqrt(max(across, 0.0) / sums[0])
+    return x0, y0, np.sqrt(max(across, 0.0) / count)
 
 
 @kernel
 def _choose_windows(
-    x: Floats, y: Floats, s: Floats, first: int, last: int, widest: float, windows: Floats, w: Floats
+    x: Floats, y: Floats, s: Floats, q: Floats, first: int, last: int, widest: float, windows: Floats, w: Floats
 ) -> None:
     """Half width of the window at points first..last of a piece, into w."""
     sums = np.empty(14)
@@ -94,9 +100,9 @@ def _choose_windows(
         w[i] = min(windows[0], widest)
         failures = 0
         for candidate in windows[1:]:
-            if candidate > widest or failures > 2:
+            if candidate > widest or (candidate > _DARING and failures > 1):
                 break
-            _, _, rms = quadratic_at(x, y, s, i, candidate, sums)
+            _, _, rms = quadratic_at(x, y, s, q, i, candidate, sums)
             if rms <= STAIR_NOISE:
                 w[i] = candidate
                 failures = 0
@@ -113,8 +119,8 @@ def _choose_windows(
 
 
 @kernel
-def _extend(points: Floats, arc: Floats, first: int, last: int, closed: bool, reach: float, out: Floats) -> int:
-    """Copy a piece into out (rows x, y, s), continued by `reach` at both ends; gives the place of its first point.
+def _extend(points: Floats, arc: Floats, weight: Floats, first: int, last: int, closed: bool, reach: float, out: Floats) -> int:
+    """Copy a piece into out (rows x, y, s, weight), continued by `reach` at both ends; gives the place of its first point.
 
     A closed chain goes on round, an open piece by its own image turned about its end: the curve keeps its ends.
     """
@@ -137,14 +143,16 @@ def _extend(points: Floats, arc: Floats, first: int, last: int, closed: bool, re
             out[0, at], out[1, at] = 2 * points[pin, 0] - points[i, 0], 2 * points[pin, 1] - points[i, 1]
             out[2, at] = 2 * arc[pin] - arc[i]
         else:
-            out[0, at], out[1, at], out[2, at] = points[first + k, 0], points[first + k, 1], arc[first + k]
+            i = first + k
+            out[0, at], out[1, at], out[2, at] = points[i, 0], points[i, 1], arc[i]
+        out[3, at] = weight[i]
     out[2, before + n + after + 1 :] = np.inf
     return before
 
 
 @kernel
 def fit_pieces(
-    points: Floats, arc: Floats, pieces: Ints, closed: NDArray[np.bool_], windows: Floats
+    points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed: NDArray[np.bool_], windows: Floats
 ) -> Floats:
     """Smooth pieces of chains by local quadratics.
 
@@ -154,6 +162,8 @@ def fit_pieces(
         Dense points; the ends of open pieces already where they stay.
     arc : float64, shape (n,)
         Length along the pixel boundary.
+    weight : float64, shape (n,)
+        How well each point is known.
     pieces : int64, shape (k, 2)
         First and last point of each piece.
     closed : bool, shape (k,)
@@ -170,7 +180,7 @@ def fit_pieces(
     longest = 0
     for k in range(len(pieces)):
         longest = max(longest, pieces[k, 1] - pieces[k, 0])
-    out = np.empty((3, 3 * longest + 4))
+    out = np.empty((4, 3 * longest + 4))
     w = np.empty(3 * longest + 4)
     sums = np.empty(14)
     for k in range(len(pieces)):
@@ -180,11 +190,11 @@ def fit_pieces(
         widest = min(length / 4 if closed[k] else length / 2, windows[-1])
         if (closed[k] and n < _SHORTEST_LOOP) or widest < 1.0:
             continue
-        at = _extend(points, arc, first, last, closed[k], widest, out)
-        x, y, s = out[0], out[1], out[2]
-        _choose_windows(x, y, s, at, at + n, widest, windows, w)
+        at = _extend(points, arc, weight, first, last, closed[k], widest, out)
+        x, y, s, q = out[0], out[1], out[2], out[3]
+        _choose_windows(x, y, s, q, at, at + n, widest, windows, w)
         for j in range(0 if closed[k] else 1, n):
-            dx, dy, _ = quadratic_at(x, y, s, at + j, w[at + j], sums)
+            dx, dy, _ = quadratic_at(x, y, s, q, at + j, w[at + j], sums)
             fitted[first + j, 0] += dx
             fitted[first + j, 1] += dy
         if closed[k]:

@@ -16,7 +16,7 @@ _NEAR, _FAR = 1.2, 8.0  # px of arc of a chain that its line is fitted to
 _PULL = 0.15  # weight of the old place against that of one line
 _FARTHEST = 0.5  # px that a node moves at most
 _ROOM = 0.35  # of the local feature size and of the shortest chain at the node, so that no two nodes can meet
-_BORDER_WINDOWS = np.array([48.0, 36.0, 27.0, 20.0, 15.0, 11.0])  # px of arc that say where a chain meets the border
+_BORDER_WINDOWS = np.array([96.0, 68.0, 48.0, 36.0, 27.0, 20.0, 15.0, 11.0])  # px of arc that say where a chain meets the border
 _BORDER_NOISE = 0.31  # px of residual up to which they are believed
 _JUNCTION = int(PointKind.JUNCTION)
 

@@ -116,10 +116,7 @@ def smooth_boundaries(graph: BoundaryGraph, options: SmoothingOptions | None = N
     curves = curves_of(graph)
     limit = per_point(curves, _asked_sizes(graph, options))
     is_corner = find_corners(curves)
-    room = np.minimum(
-        _SHARE * options.max_shift,
-        _ROOM * local_feature_size(curves.raw, curves, _NARROW, _ARC_RATIO),
-    )
+    room = _room(curves, is_corner, options.max_shift)
     node = place_junctions(curves, room, graph.shape)
     smooth = _smooth(curves, node, is_corner, room)
     size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, graph.shape)
@@ -151,13 +148,19 @@ def _asked_sizes(graph: BoundaryGraph, options: SmoothingOptions) -> Floats:
     return of_region[graph.chain_regions].min(axis=1)
 
 
+def _room(curves: Curves, is_corner: Flags, max_shift: float) -> Floats:
+    """How far smoothing may move each dense point."""
+    free = _ROOM * local_feature_size(curves.raw, curves, _NARROW, _ARC_RATIO)
+    return np.minimum(free, np.where(is_corner, 1.0, _SHARE) * max_shift)
+
+
 def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats) -> Floats:
     """Smooth all chains between their moved ends and corners, within `room` of the pixel boundary."""
     pinned = curves.raw.copy()
     place_corners(curves, is_corner, room, pinned)
     pin_ends(pinned, curves, node)
     pieces, closed = _pieces(curves, is_corner)
-    smooth = fit_pieces(pinned, curves.arc, pieces, closed, np.array(WINDOWS))
+    smooth = fit_pieces(pinned, curves.arc, curves.weight, pieces, closed, np.array(WINDOWS))
     shift = smooth - curves.raw
     length = np.hypot(shift[:, 0], shift[:, 1])
     smooth = curves.raw + shift * np.minimum(1.0, room / np.maximum(length, 1e-300))[:, None]
@@ -358,7 +361,7 @@ def _restore(
         bad = is_bad[nodes.chain_points]
         bad[1:] |= bad[:-1].copy()
         bad[:-1] |= bad[1:].copy()
-        bound[bad] *= 0.5 if attempt < _AREA_ROUNDS // 3 else 0.0
+        bound[bad] *= 0.5 if attempt < 1 else 0.0
     return nodes
 
 
