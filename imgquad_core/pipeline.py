@@ -66,6 +66,8 @@ class MeshOptions:
         Whether pixels of alpha 0 are left out too.
     crop : tuple of int, optional
         Left, upper, right, lower bound of the part that is meshed, from the picture's upper left corner.
+    frame : int, optional
+        Which picture of a stack, counted from 0.
     max_pixels : int
         Larger pictures are refused.
     effort : "fast", "normal" or "best"
@@ -88,6 +90,7 @@ class MeshOptions:
     drop: tuple[str | int, ...] = ()
     drop_transparent: bool = False
     crop: Box | None = None
+    frame: int | None = None
     max_pixels: int = ReadOptions.max_pixels
     effort: str = "normal"
     threads: int = 1
@@ -100,6 +103,7 @@ class MeshOptions:
         self.meshing(None)
         self.segmentation()
         self.noise(True, (1, 1))
+        ReadOptions(self.max_pixels, self.frame)
         ExtractionOptions(self.policy)
 
     def segmentation(self) -> SegmentationOptions:
@@ -228,7 +232,7 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     """
     options = options or MeshOptions()
     timed = _Stopwatch(progress)
-    raw = timed("read", read_source, source, ReadOptions(max_pixels=options.max_pixels))
+    raw = timed("read", read_source, source, ReadOptions(options.max_pixels, options.frame))
     found = timed("segment", segment_picture, raw, options.segmentation())
     picture = crop_image(found.image, options.crop) if options.crop else found.image
     noise = options.noise(found.quantised, found.image.shape)

@@ -58,8 +58,8 @@ def notes(run: Run) -> Iterator[str]:
     wanted = np.count_nonzero(run.labels.labels >= 0) / run.options.size**2
     if run.mesh.n_quads > 4 * wanted and run.mesh.n_quads > 1000:
         yield (
-            f"thin features need {run.mesh.n_quads / wanted:.1f} times as many quads as the size alone: "
-            "remove noise (--min-pixels, --min-length), or ask for a smaller size"
+            f"thin features force {run.mesh.n_quads / wanted:.1f} times as many quads as area / size^2: "
+            "remove noise (--min-pixels, --min-length), or drop or merge materials"
         )
 
 

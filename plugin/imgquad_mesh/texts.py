@@ -59,6 +59,7 @@ TEXTS: Mapping[str, Text] = {
     "boundary_size": _LENGTH_OR_AUTO,
     "material_sizes": Text(_sizes, _write_sizes),
     "drop": Text(lambda text: tuple(_items(text)), lambda names: _joined(map(str, names))),
+    "frame": Text(lambda text: command.whole(text) if text else None, lambda v: "" if v is None else str(v)),
     "crop": Text(lambda text: command.box(text) if text else None, lambda box: ",".join(map(str, box)) if box else ""),
 }
 

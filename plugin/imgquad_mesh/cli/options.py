@@ -24,6 +24,7 @@ def add_mesh_options(parser: argparse.ArgumentParser) -> None:
     add("--crop", type=box, metavar="X0,Y0,X1,Y1", help="mesh this part only; pixels from the upper left corner")
     add("--drop", action="append", metavar="MATERIAL", help="leave a material (name or number) out; repeatable")
     add("--drop-transparent", action="store_true", default=None, help="leave pixels of alpha 0 out")
+    add("--frame", type=whole, metavar="K", help="which picture of a stack (pages of a TIFF), counted from 0")
     add("--max-pixels", type=int, metavar="N", help="refuse larger pictures (default: 100 million)")
 
     add = parser.add_argument_group("noise").add_argument
@@ -85,14 +86,19 @@ def size_of(text: str) -> tuple[str, float]:
 
 def whole_or_auto(text: str) -> int | str:
     """Return 'auto' or a whole number."""
-    if text != "auto" and not text.isdigit():
-        raise argparse.ArgumentTypeError(f"'{text}' is neither auto nor a whole number of pixels")
-    return text if text == "auto" else int(text)
+    return text if text == "auto" else whole(text)
 
 
 def real_or_auto(text: str) -> float | str:
     """Return 'auto' or a number."""
     return text if text == "auto" else number(text)
+
+
+def whole(text: str) -> int:
+    """Return a whole number, 0 or more."""
+    if not text.isdigit():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number")
+    return int(text)
 
 
 def number(text: str) -> float:
