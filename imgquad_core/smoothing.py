@@ -26,13 +26,14 @@ from imgquad_core.jit import kernel
 from imgquad_core.junctions import place_junctions
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
 from imgquad_core.placement import Placement, even_out, place_nodes, points_at
-from imgquad_core.spacing import FINEST, edge_sizes
+from imgquad_core.spacing import edge_sizes
 
 _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign points that both move it cannot meet
 _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for areas
 _NARROW = 2.0  # px; reach of the local feature size that bounds shifts
 _ARC_RATIO = 2.0  # arc over distance of a foreign point of the pixel boundary
 _LEAST_SECTOR = np.radians(30.0)
+_CLOSEST = 0.25  # px between nodes, to which they are drawn together where they conflict
 _AREA_ROOM = 0.7  # of the bound of smoothing, for the shift that restores areas
 _AREA_ROUNDS = 10
 _GENTLE_ROUNDS, _ROUNDS = 8, 14  # rounds that mind sectors and room; rounds until faulty chains get their pixels back
@@ -212,7 +213,7 @@ def _place_freely(
         if worst == 0:
             return nodes, attempt < _GENTLE_ROUNDS
         is_new = _touched(curves, factor)
-        size = np.maximum(size * factor, np.minimum(FINEST, limit))
+        size = np.maximum(size * factor, np.minimum(_CLOSEST, limit))
         withdrawn = np.minimum(withdrawn + pull, 1.0)
         if attempt >= _ROUNDS:
             exact |= np.logical_or.reduceat(factor < 1, curves.offsets[:-1]) | (attempt > _ROUNDS + 6)

@@ -13,8 +13,9 @@ from imgquad_core.curves import Curves, Floats
 from imgquad_core.features import local_feature_size
 from imgquad_core.jit import kernel
 
-FINEST = 0.25  #: px, smallest edge length asked for: half of the narrowest boundary that pixels can make
-_ACROSS = 0.85  # edge length over local feature size: two coarse segments are at most 1.7 times as long as it is wide
+_FINEST = 0.5  # px, smallest edge length asked for in thin places; pixels leave none under 0.7 px
+_FINEST_BEND = 1.0  # and where the curve only bends
+_ACROSS = 1.0  # edge length over local feature size: coarse segments are at most twice as long as the place is wide
 _BEND = 4.0  # arc over distance of a foreign point; chains that meet at more than 29 degrees do not count as thin
 _TURN = 0.55  # radians from one edge to the next
 _OVER = 2.0  # px of arc to each side over which the bend is measured
@@ -50,7 +51,7 @@ def edge_sizes(
     lfs = local_feature_size(points, curves, reach, _BEND)
     size = np.minimum(limit, _ACROSS * lfs)
     _limit_turn(points, curves.offsets, curves.arc, is_corner, size)
-    size = np.minimum(np.maximum(size, FINEST), limit)
+    size = np.minimum(np.maximum(size, _FINEST), limit)
     return grade(size, points, curves, growth, edge_ratio, shape)
 
 
@@ -82,7 +83,7 @@ def _limit_turn(points: Floats, offsets: Floats, arc: Floats, is_corner: Floats,
             turn = abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
             apart = 0.5 * (np.hypot(ux, uy) + np.hypot(vx, vy))
             if turn * size[i] > _TURN * apart:
-                size[i] = _TURN * apart / turn
+                size[i] = max(_TURN * apart / turn, min(size[i], _FINEST_BEND))
 
 
 @kernel
