@@ -38,6 +38,15 @@ def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, int, int], None]]:
         yield show
 
 
+def announce_compiling() -> None:
+    """Say so if this is the first run, which takes longer."""
+    import imgquad_core.pipeline  # noqa: F401  (imports all kernels)
+    from imgquad_core.jit import share_on_disk
+
+    if share_on_disk() < 0.5:
+        Console(stderr=True).print("first run on this machine: compiling the kernels takes about half a minute, once")
+
+
 def print_report(report: dict[str, Any]) -> None:
     """Print the report's figures as a short table."""
     console = Console(highlight=False)

@@ -99,12 +99,14 @@ def mesh_to_files(
         A quad is below `min_quality`; all files are written.
     """
     from imgquad_core.quality import require_quality
-    from imgquad_mesh.cli.console import print_report, progress_bar_if
+    from imgquad_mesh.cli.console import announce_compiling, print_report, progress_bar_if
     from imgquad_mesh.files import write_json
     from imgquad_mesh.report import build_report
 
     start = perf_counter()
     outputs.check()
+    if not quiet:
+        announce_compiling()
     with progress_bar_if(not quiet) as progress:
         run = _run(image, options, progress)
         wrote = perf_counter()
