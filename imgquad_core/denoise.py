@@ -150,6 +150,8 @@ def list_removed(before: LabelImage, after: LabelImage) -> tuple[Removal, ...]:
     """
     if before.shape != after.shape:
         raise InputError(f"before is {before.shape}, after is {after.shape} pixels: give the two ends of one removal")
+    if before.labels is after.labels:
+        return ()
     changed = (before.labels != after.labels).ravel()
     parent = labelled_clusters(_ranked(before.labels)[1]).parent
     lost = before.labels.ravel()[changed]
