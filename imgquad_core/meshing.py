@@ -20,12 +20,12 @@ from .composing import compose
 from .crossfield import cross_field
 from .cutting import CutMesh, FaceConflict, cut_at_constraints
 from .errors import InputError, TopologyError
-from .frontal import frontal_points
+from .frontal import frontal_points, wanted_quads
 from .halfedge import twins_of
 from .model import BoundaryGraph, Materials, PointKind, QuadMesh
 from .outline import Flags, Outline, chains_of, coarse_segments, halved, outline, wide_faces
-from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, untangle, worst_of_faces
-from .splitting import FaceQuads, middles_of, split_composed, split_quads
+from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
+from .splitting import INNER_VALENCE, FaceQuads, middles_of, split_composed, split_quads
 from .topology import CleanUp, clean_up
 from .triangulation import Triangles, constraint_table, triangulate
 
@@ -265,7 +265,8 @@ def _fitted(part: FaceQuads, targets: Points) -> tuple[FaceQuads, Ids]:
     rim = part.origin >= 0
     points = part.points.copy()
     late = fit_rim(points, rings_of(part.quads, len(points)), rim, targets[part.origin], FIT_ROUNDS)
-    return part._replace(points=points), part.origin[late]
+    wanted = np.where(rim, wanted_quads(sector_angles(points, part.quads)), INNER_VALENCE)
+    return part._replace(points=points, wanted=wanted), part.origin[late]
 
 
 def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int) -> FaceQuads:

@@ -298,3 +298,16 @@ def worst_of_faces(points: Points, quads: Ids, face: Ids, n_faces: int) -> Point
     for q in range(len(quads)):
         worst[face[q]] = min(worst[face[q]], quad_quality(points, quads, q))
     return worst
+
+
+@kernel
+def sector_angles(points: Points, quads: Ids) -> Points:
+    """Sum of the corner angles at each node: the angle of its sector for a node on the rim."""
+    angle = np.zeros(len(points))
+    for q in range(len(quads)):
+        for k in range(4):
+            v, a, b = quads[q, k], quads[q, (k + 1) & 3], quads[q, (k + 3) & 3]
+            ax, ay = points[a, 0] - points[v, 0], points[a, 1] - points[v, 1]
+            bx, by = points[b, 0] - points[v, 0], points[b, 1] - points[v, 1]
+            angle[v] += np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+    return angle
