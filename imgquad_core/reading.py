@@ -59,6 +59,7 @@ def read_picture(path: str | Path, options: ReadOptions | None = None) -> Pictur
     Picture
         Grey values and labels as they are stored (8, 16, 32 bit or float; a small range that the format stretches is
         put back: 2 and 4 bit PNG, PGM with a maximum other than 255), palette indices with their palette, or RGB.
+        Integers of one channel in NPY, and signed or 32 bit ones in TIFF, are material numbers however many.
         CMYK, YCbCr and the like are turned into RGB. Alpha 0 becomes not opaque. 16 bit RGB is kept from TIFF; of a
         PNG, Pillow gives the upper 8 bits.
 
