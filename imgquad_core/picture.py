@@ -113,4 +113,4 @@ def _as_rgb(values: NDArray[Any], name: str) -> NDArray[Any]:
         )
     if values.dtype.kind == "f":
         return np.rint(values * (255 if high <= 1 else 1)).astype(np.uint8)
-    return values.astype(np.uint8 if high <= 255 else np.uint16)
+    return np.asarray(values, np.uint8 if high <= 255 else np.uint16)
