@@ -112,5 +112,5 @@ def _as_rgb(values: NDArray[Any], name: str) -> NDArray[Any]:
             f"colours of {name} go from {low} to {high}: give 0 to 255 (8 bit), 65535 (16 bit) or 1 (float)"
         )
     if values.dtype.kind == "f":
-        return np.rint(values * (255 if high <= 1 else 1)).astype(np.uint8)
+        return np.asarray(np.rint(values * (255 if high <= 1 else 1)), np.uint8)
     return np.asarray(values, np.uint8 if high <= 255 else np.uint16)
