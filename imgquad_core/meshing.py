@@ -25,6 +25,7 @@ from .halfedge import twins_of
 from .model import BoundaryGraph, Materials, PointKind, QuadMesh
 from .outline import Flags, Outline, chains_of, coarse_segments, halved, outline, wide_faces
 from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
+from .repair import repair
 from .splitting import INNER_VALENCE, FaceQuads, middles_of, split_composed, split_quads
 from .topology import CleanUp, clean_up
 from .triangulation import Triangles, constraint_table, triangulate
@@ -36,6 +37,7 @@ STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
+POOR = 0.5  # scaled Jacobian below which single quads are replaced
 REFITS = 12  # rounds in which boundary points that fold a quad go back to the chord
 
 
@@ -223,7 +225,7 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
             part = split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
             part, later = _fitted(part, graph.points)
             late = np.concatenate([late, later])
-        return _relaxed(part, 8, 6), late
+        return _without_poor(_relaxed(part, 8, 6)), late
 
     done = in_batches(composed, finish, options.threads)
     quads = joined([part for part, _ in done])
@@ -277,6 +279,12 @@ def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int) -> FaceQu
     untangle(points, rings, free, 2, BAD)
     newton(points, rings, free, newton_sweeps, GOOD)
     return part._replace(points=points)
+
+
+def _without_poor(part: FaceQuads) -> FaceQuads:
+    """Replace the worst quads and smooth what is new."""
+    better = repair(part, POOR)
+    return part if better is part else _relaxed(better, 3, 6)
 
 
 def _faces_at(graph: BoundaryGraph, points: Ids) -> Flags:

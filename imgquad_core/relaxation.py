@@ -62,6 +62,15 @@ def quad_quality(points: Points, quads: Ids, q: int) -> float:
 
 
 @kernel
+def quad_area(points: Points, quads: Ids, q: int) -> float:
+    a, b, c, d = quads[q, 0], quads[q, 1], quads[q, 2], quads[q, 3]
+    return 0.5 * (
+        (points[c, 0] - points[a, 0]) * (points[d, 1] - points[b, 1])
+        - (points[d, 0] - points[b, 0]) * (points[c, 1] - points[a, 1])
+    )
+
+
+@kernel
 def ring_quality(points: Points, rings: Rings, v: int) -> float:
     """Worst scaled Jacobian of the quads around node v."""
     worst = 1.0

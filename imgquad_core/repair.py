@@ -1,0 +1,205 @@
+"""Replace the worst quads: best quads for a small outline, whatever the valences.
+
+Around a poor quad a few small cavities are tried. Their outlines (an even number of nodes) are filled either without
+any new node, by the quads whose worst scaled Jacobian is largest (dynamic programming over the outline), or by a star:
+
+    b----c         b----c
+    |    |        / \\    \\        the quad i a b j splits an outline into three shorter ones;
+    a    d   or  a   o----d       a star joins every second node to a new one, o
+    | /  |        \\ /    /
+    i----j         i----j
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cavity import MEMBERS, OUTLINE, Cavity, Net, add_quad, add_ring, begin, compact, insert, net_of, remove, scratch, settle
+from .jit import kernel
+from .patterns import Canvas
+from .relaxation import quad_quality
+from .splitting import FaceQuads
+
+Ids = NDArray[np.int64]
+Points = NDArray[np.float64]
+
+LARGEST = 24  # quads of a cavity
+LONGEST = 16  # nodes of an outline
+LEAST_GAIN = 0.02  # of the worst scaled Jacobian
+ANY = 99  # quads that a node of the outline may need: valences do not count here
+ROUNDS = 2
+CENTRE_STEPS = 24
+
+
+def repair(mesh: FaceQuads, below: float) -> FaceQuads:
+    """Replace quads whose scaled Jacobian is less than `below` where that makes the worst one better."""
+    if len(mesh.quads) == 0:
+        return mesh
+    net = net_of(mesh, LARGEST)
+    cavity, canvas = scratch(net, LARGEST)
+    changed = 0
+    for _ in range(ROUNDS):
+        done = _repair_pass(net, cavity, canvas, below)
+        changed += done
+        if done == 0:
+            break
+    return compact(net, mesh) if changed else mesh
+
+
+@kernel
+def _best_fill(points: Points, loop: Ids, n: int, best: Points, first: Ids, second: Ids) -> float:
+    """Fill the tables of the best quads for each run of an outline; return the worst quality of the best filling."""
+    corners = np.empty((1, 4), np.int64)
+    for i in range(n - 1):
+        best[i, i + 1] = 1.0
+    for run in range(3, n, 2):
+        for i in range(n - run):
+            j = i + run
+            best[i, j] = -2.0
+            for a in range(i + 1, j, 2):
+                for b in range(a + 1, j, 2):
+                    rest = min(best[i, a], min(best[a, b], best[b, j]))
+                    if rest <= best[i, j]:
+                        continue
+                    corners[0, 0], corners[0, 1], corners[0, 2], corners[0, 3] = loop[i], loop[a], loop[b], loop[j]
+                    worst = min(rest, quad_quality(points, corners, 0))
+                    if worst > best[i, j]:
+                        best[i, j], first[i, j], second[i, j] = worst, a, b
+    return best[0, n - 1]
+
+
+@kernel
+def _draw_fill(canvas: Canvas, loop: Ids, n: int, first: Ids, second: Ids) -> None:
+    """Draw the quads that the tables tell."""
+    runs = np.empty((2 * n, 2), np.int64)
+    runs[0, 0], runs[0, 1] = 0, n - 1
+    top = 1
+    canvas.count[:] = 0
+    while top > 0:
+        top -= 1
+        i, j = runs[top, 0], runs[top, 1]
+        if j - i < 3:
+            continue
+        a, b, q = first[i, j], second[i, j], canvas.count[1]
+        canvas.quads[q, 0], canvas.quads[q, 1], canvas.quads[q, 2], canvas.quads[q, 3] = loop[i], loop[a], loop[b], loop[j]
+        canvas.count[1] += 1
+        runs[top, 0], runs[top, 1] = i, a
+        runs[top + 1, 0], runs[top + 1, 1] = a, b
+        runs[top + 2, 0], runs[top + 2, 1] = b, j
+        top += 3
+
+
+@kernel
+def _worst_drawn(canvas: Canvas) -> float:
+    worst = 1.0
+    for q in range(canvas.count[1]):
+        worst = min(worst, quad_quality(canvas.points, canvas.quads, q))
+    return worst
+
+
+@kernel
+def _draw_star(canvas: Canvas, loop: Ids, n: int, turn: int) -> float:
+    """Draw a star whose centre is joined to the nodes turn, turn + 2, ...; return its worst quality."""
+    canvas.count[0], canvas.count[1] = 1, n // 2
+    o = canvas.first
+    canvas.points[o, 0], canvas.points[o, 1], reach = 0.0, 0.0, 0.0
+    for i in range(n):
+        canvas.points[o, 0] += canvas.points[loop[i], 0] / n
+        canvas.points[o, 1] += canvas.points[loop[i], 1] / n
+    for i in range(0, n, 2):
+        q = i // 2
+        canvas.quads[q, 0], canvas.quads[q, 3] = loop[(turn + i) % n], o
+        canvas.quads[q, 1], canvas.quads[q, 2] = loop[(turn + i + 1) % n], loop[(turn + i + 2) % n]
+        v = loop[i]
+        reach = max(reach, np.hypot(canvas.points[v, 0] - canvas.points[o, 0], canvas.points[v, 1] - canvas.points[o, 1]))
+    best, step = _worst_drawn(canvas), 0.3 * reach
+    for _ in range(CENTRE_STEPS):
+        x, y = canvas.points[o, 0], canvas.points[o, 1]
+        best_x, best_y = x, y
+        for d in range(8):
+            canvas.points[o, 0], canvas.points[o, 1] = x + step * np.cos(d * np.pi / 4), y + step * np.sin(d * np.pi / 4)
+            worst = _worst_drawn(canvas)
+            if worst > best + 1e-9:
+                best, best_x, best_y = worst, canvas.points[o, 0], canvas.points[o, 1]
+        canvas.points[o, 0], canvas.points[o, 1] = best_x, best_y
+        if best_x == x and best_y == y:
+            step *= 0.6
+    return best
+
+
+@kernel
+def _grow(net: Net, cavity: Cavity, q: int, trial: int) -> bool:
+    """Make the cavity of a trial: the ring of a corner of quad q (0 to 3), the quads beside it (4), all rings (5)."""
+    begin(cavity)
+    if trial < 4:
+        add_ring(net, cavity, net.quads[q, trial])
+    else:
+        add_quad(net, cavity, q)
+        for k in range(4):
+            if trial == 5:
+                add_ring(net, cavity, net.quads[q, k])
+            elif net.twins[4 * q + k] >= 0:
+                add_quad(net, cavity, net.twins[4 * q + k] >> 2)
+    return settle(net, cavity, LARGEST, ANY) and cavity.count[OUTLINE] <= LONGEST
+
+
+@kernel
+def _worst_member(net: Net, cavity: Cavity) -> float:
+    worst = 1.0
+    for i in range(cavity.count[MEMBERS]):
+        worst = min(worst, quad_quality(net.points, net.quads, cavity.members[i]))
+    return worst
+
+
+@kernel
+def _try(net: Net, cavity: Cavity, canvas: Canvas, kind: int, best: Points, first: Ids, second: Ids) -> float:
+    """Draw a filling of the outline: 0 without a new node, 1 and 2 stars; return its worst quality."""
+    n = cavity.count[OUTLINE]
+    if kind > 0:
+        return _draw_star(canvas, cavity.loop, n, kind - 1)
+    worst = _best_fill(net.points, cavity.loop, n, best, first, second)
+    if worst > 0.0:
+        _draw_fill(canvas, cavity.loop, n, first, second)
+    return worst
+
+
+@kernel
+def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
+    """Whether nodes of the outline can take all drawn quads."""
+    for i in range(cavity.count[OUTLINE]):
+        if net.valence[cavity.loop[i]] + canvas.count[1] > net.ring.shape[1]:
+            return False
+    return canvas.count[1] <= net.tops[0] and canvas.count[0] <= net.tops[1]
+
+
+@kernel
+def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float) -> int:
+    """Try to replace each quad worse than `below`; return how many cavities were filled anew."""
+    best, first, second = np.empty((LONGEST, LONGEST)), np.empty((LONGEST, LONGEST), np.int64), np.empty(
+        (LONGEST, LONGEST), np.int64
+    )
+    new_id = np.empty(canvas.quads.shape[0], np.int64)
+    done = 0
+    for q in range(len(net.quads)):
+        if net.quads[q, 0] < 0 or quad_quality(net.points, net.quads, q) >= below:
+            continue
+        chosen, chosen_trial, chosen_kind = LEAST_GAIN, -1, -1
+        for trial in range(6):
+            if not _grow(net, cavity, q, trial):
+                continue
+            worst = _worst_member(net, cavity)
+            for kind in range(3):
+                gain = min(_try(net, cavity, canvas, kind, best, first, second), below) - worst
+                if gain > chosen:
+                    chosen, chosen_trial, chosen_kind = gain, trial, kind
+        if chosen_trial < 0:
+            continue
+        _grow(net, cavity, q, chosen_trial)
+        _try(net, cavity, canvas, chosen_kind, best, first, second)
+        if _rings_have_room(net, cavity, canvas):
+            face = net.face[cavity.members[0]]
+            remove(net, cavity)
+            insert(net, canvas, new_id, face)
+            done += 1
+    return done
