@@ -1,0 +1,73 @@
+"""Draw the pictures of the README and of docs/: python docs/make_images.py [FOLDER]."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+
+from imgquad_core import MeshOptions, Run, run
+from imgquad_core.quality import inner_nodes, scaled_jacobian
+from imgquad_mesh.drawing import PALETTE, rock_labels
+
+COLORS = np.array(PALETTE) / 255
+
+
+def main(folder: Path) -> None:
+    """Draw all pictures into `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    part = rock_labels()[50:176, 60:249]
+    made = run(part.astype(np.int32), MeshOptions(size=4.5, min_pixels=12, min_length=6, effort="best"))
+    draw_chain(made, part, folder / "rock.png")
+    draw_quality(made, folder / "quality.png")
+
+
+def draw_chain(made: Run, part: Any, path: Path) -> None:
+    """Draw the picture, its smoothed boundaries and its mesh, side by side."""
+    figure, panels = _panels(3, made.labels.shape)
+    rows, cols = made.labels.shape
+    panels[0].imshow(COLORS[part], extent=(0, cols, 0, rows), interpolation="nearest")
+    lines = [made.boundary.points[made.boundary.chain(c)] for c in range(made.boundary.n_chains)]
+    panels[1].imshow(COLORS[made.labels.labels], extent=(0, cols, 0, rows), interpolation="nearest", alpha=0.35)
+    panels[1].add_collection(LineCollection(lines, colors="black", linewidths=1.0))
+    _add_quads(panels[2], made, COLORS[made.mesh.quad_material])
+    figure.savefig(path, facecolor="white")
+
+
+def draw_quality(made: Run, path: Path) -> None:
+    """Draw the mesh coloured by scaled Jacobian, with its irregular inner nodes."""
+    figure, (panel,) = _panels(1, made.labels.shape)
+    quality = _add_quads(panel, made, None)
+    quality.set_array(scaled_jacobian(made.mesh.points, made.mesh.quads))
+    quality.set_clim(0.4, 1.0)
+    irregular = inner_nodes(made.mesh) & (made.mesh.valence != 4)
+    panel.plot(*made.mesh.points[irregular].T, "o", ms=4, mfc="red", mec="black", mew=0.5)
+    figure.colorbar(quality, ax=panel, label="scaled Jacobian", shrink=0.8)
+    figure.savefig(path, facecolor="white")
+
+
+def _panels(n: int, shape: tuple[int, int]) -> tuple[Figure, list[Any]]:
+    rows, cols = shape
+    figure = Figure(figsize=(n * 4.2, 4.2 * rows / cols), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = list(figure.subplots(1, n, squeeze=False)[0])
+    for panel in panels:
+        panel.set(xlim=(0, cols), ylim=(0, rows), aspect="equal", xticks=[], yticks=[])
+    return figure, panels
+
+
+def _add_quads(panel: Any, made: Run, colors: Any) -> PolyCollection:
+    quads = PolyCollection(
+        list(made.mesh.points[made.mesh.quads]), facecolors=colors, edgecolors="black", linewidths=0.35, cmap="viridis"
+    )
+    panel.add_collection(quads)
+    return quads
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "images")
