@@ -18,6 +18,7 @@ from .denoise import DenoiseOptions, Removal, automatic_limits, list_removed, re
 from .errors import InputError
 from .meshing import MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
+from .periodic import DIRECTIONS, match_opposite_sides
 from .reading import Picture, ReadOptions, read_picture
 from .segmentation import Segmentation, SegmentationOptions, segment_picture
 from .selection import Box, assert_solid, crop_image, drop_materials, material_number
@@ -68,6 +69,8 @@ class MeshOptions:
         Left, upper, right, lower bound of the part that is meshed, from the picture's upper left corner.
     frame : int, optional
         Which picture of a stack, counted from 0.
+    periodic : "none", "x", "y" or "xy"
+        Opposite sides get nodes at the same places, for a periodic cell; see `match_opposite_sides`.
     max_pixels : int
         Larger pictures are refused.
     effort : "fast", "normal" or "best"
@@ -90,6 +93,7 @@ class MeshOptions:
     drop: tuple[str | int, ...] = ()
     drop_transparent: bool = False
     crop: Box | None = None
+    periodic: str = "none"
     frame: int | None = None
     max_pixels: int = ReadOptions.max_pixels
     effort: str = "normal"
@@ -98,6 +102,8 @@ class MeshOptions:
     def __post_init__(self) -> None:
         if not (isfinite(self.pixel_size) and self.pixel_size > 0):
             raise InputError(f"pixel_size is {self.pixel_size}: give a length above 0")
+        if self.periodic not in ("none", *DIRECTIONS):
+            raise InputError(f"periodic is '{self.periodic}': give none, x, y or xy")
         # each stage checks its own options: now, not after minutes of work
         self.smoothing(None)
         self.meshing(None)
@@ -242,6 +248,8 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     _assert_feasible(labels, smoothing)
     staircase = timed("boundary", extract_boundaries, labels, ExtractionOptions(options.policy))
     boundary = timed("smooth", smooth_boundaries, staircase, smoothing)
+    if options.periodic != "none":
+        boundary = match_opposite_sides(boundary, options.periodic)
     mesh = timed("mesh", mesh_boundaries, boundary, meshing, labels.materials)
     return Run(
         options=options,

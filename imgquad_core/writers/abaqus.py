@@ -15,6 +15,7 @@ from imgquad_core.properties import Properties, read_properties, values_of
 from imgquad_core.writers.common import rows, safe_names, wrapped, write_text
 from imgquad_core.writers.decks import DECKS, deck_text
 from imgquad_core.writers.interfaces import interface_text
+from imgquad_core.writers.periodicity import driver_names, equation_text
 
 #: element type by analysis and kind; a reduced one has an R behind it
 ELEMENTS: Mapping[str, Mapping[str, str]] = {
@@ -100,13 +101,15 @@ def write_abaqus(
     sets = {**mesh.material_cells(), **(mesh.region_cells() if regions else {})}
     labels = Labels(
         safe_names([*sets, *mesh.cohesive_cells()], NAME_LIMIT, reserved=("EALL",), upper=True),
-        safe_names(mesh.node_sets, NAME_LIMIT, reserved=("NALL",), upper=True),
+        safe_names(mesh.node_sets, NAME_LIMIT, reserved=("NALL", *driver_names(mesh).values()), upper=True),
         safe_names([f"S_{name}" for name in mesh.side_sets], NAME_LIMIT, upper=True),
     )
     parts = [*_head(mesh, element), *_sets(mesh, sets, labels), *_sections(mesh, labels, values, thickness)]
     if len(mesh.cohesive):
         chosen_form = interfaces or ("springs" if deck else "elements")
         parts += interface_text(mesh, labels.elements, values, thickness, chosen_form)
+    if mesh.periodic:
+        parts += equation_text(mesh, heat="heat" in chosen or deck == "thermal")
     if deck is not None:
         parts += deck_text(mesh, deck, values, labels.elements, labels.nodes)
     write_text(path, parts)

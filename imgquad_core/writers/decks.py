@@ -11,10 +11,10 @@ from scipy.sparse.csgraph import connected_components
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import KINDS, FEMesh, Ints
 from imgquad_core.properties import Properties, values_of
+from imgquad_core.writers.periodicity import STRAIN, periodic_deck
 
 #: what each deck needs of every material
 DECKS: Mapping[str, tuple[str, ...]] = {"tension": ("young", "poisson"), "thermal": ("conductivity",)}
-STRAIN = 1e-3  #: mean strain of the tension deck
 
 
 def deck_text(
@@ -45,6 +45,8 @@ def deck_text(
                 f"the deck '{deck}' needs {' and '.join(missing)} of material '{name}'; "
                 f'give them in a TOML file of properties below [{name}] or ["*"]'
             )
+    if mesh.periodic:
+        return periodic_deck(mesh, deck)
     for border in ("left", "right"):
         if border not in mesh.node_sets:
             raise InputError(f"the deck '{deck}' needs the {border} border, but no element lies on it")

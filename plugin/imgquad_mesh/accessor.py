@@ -37,6 +37,7 @@ class ImageAccessor:
         max_shift: float = 1.0,
         drop: Sequence[str | int] = (),
         drop_transparent: bool = False,
+        periodic: str = "none",
         effort: str = "normal",
         threads: int = 1,
         progress_bar: bool = False,
@@ -70,6 +71,8 @@ class ImageAccessor:
             Materials that are left out, by name or number.
         drop_transparent : bool, default: False
             Leave pixels of alpha 0 out, too.
+        periodic : "none" | "x" | "y" | "xy", default: "none"
+            Opposite sides get nodes at the same places, for a periodic cell.
         effort : "fast" | "normal" | "best", default: "normal"
             How far the mesh is optimised.
         threads : int, default: 1
@@ -111,6 +114,7 @@ class ImageAccessor:
             max_shift=max_shift,
             drop=tuple(drop),
             drop_transparent=drop_transparent,
+            periodic=periodic,
             effort=effort,
             threads=threads,
         )

@@ -29,6 +29,8 @@ class ElementOptions:
         Thickness of hexes, in the unit of the mesh.
     layers : int
         Hexes over the thickness.
+    periodic : str, optional
+        ``x``, ``y`` or ``xy``: tie the nodes of opposite sides, of a mesh made with the same option.
     """
 
     order: int = 1
@@ -36,6 +38,7 @@ class ElementOptions:
     cohesive: str | Iterable[tuple[str, str]] | None = None
     extrude: float | None = None
     layers: int = 1
+    periodic: str | None = None
 
     def __post_init__(self) -> None:
         if self.order not in (1, 2):
@@ -46,13 +49,14 @@ class ElementOptions:
     @property
     def plain(self) -> bool:
         """Whether these are just the quads of the mesh."""
-        return self.order == 1 and self.cohesive is None and self.extrude is None
+        return (self.order, self.cohesive, self.extrude, self.periodic) == (1, None, None, None)
 
 
 def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
     """Return the elements of `mesh` that `options` asks for, with all sets."""
     from imgquad_core.cohesive import split_interfaces
     from imgquad_core.extrusion import extrude
+    from imgquad_core.periodic import with_periodic_pairs
     from imgquad_core.second_order import second_order
     from imgquad_core.sets import fe_mesh
 
@@ -61,6 +65,8 @@ def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
         elements = second_order(elements, options.nodes)
     if options.cohesive is not None:
         elements = split_interfaces(elements, options.cohesive)
+    if options.periodic is not None:
+        elements = with_periodic_pairs(elements, options.periodic)
     if options.extrude is not None:
         elements = extrude(elements, options.extrude, options.layers)
     return elements

@@ -54,7 +54,7 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
     from imgquad_core.writers import write_mesh
     from imgquad_mesh.elements import ElementOptions, make_elements
 
-    names = [name for name in ("order", "nodes", "cohesive", "extrude", "layers") if name in options]
+    names = [name for name in ("order", "nodes", "cohesive", "extrude", "layers", "periodic") if name in options]
     elements = ElementOptions(**{name: options.pop(name) for name in names})
     write_mesh(make_elements(from_grid(dataset), elements), path, **options)
 

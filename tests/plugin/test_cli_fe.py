@@ -90,3 +90,13 @@ def test_what_cannot_be_written_is_said_in_one_line(
     assert message in error
     assert error.count("\n") == 1
     assert not (picture.parent / output).exists()
+
+
+@needs_ccx
+@pytest.mark.parametrize("directions", ["x", "xy"])
+def test_calculix_runs_a_periodic_cell(picture: Path, directions: str) -> None:
+    np.save(picture, np.roll(disk(48, 15), 20, axis=(0, 1)).astype(np.uint8))
+    toml = str(picture.parent / "steel.toml")
+    assert run(picture, "a.inp", "--periodic", directions, "--deck", "tension", "--properties", toml) == 0
+    stress = solve(picture.parent / "a.inp", "*EL PRINT, ELSET=EALL\nS")["stresses"]
+    assert np.abs(stress[:, [2, 3, 5]] - [210, 0, 0]).max() < 1e-4

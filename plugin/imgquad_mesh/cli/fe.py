@@ -42,7 +42,8 @@ def element_options(args: argparse.Namespace) -> ElementOptions:
 
     pairs = args.cohesive
     cohesive = None if pairs is None else "all" if "all" in pairs else pairs
-    return ElementOptions(args.order, args.nodes, cohesive, args.extrude, args.layers)
+    periodic = None if args.periodic in (None, "none") else args.periodic
+    return ElementOptions(args.order, args.nodes, cohesive, args.extrude, args.layers, periodic)
 
 
 def writer_options(args: argparse.Namespace) -> dict[str, Any]:

@@ -43,6 +43,7 @@ def add_mesh_options(parser: argparse.ArgumentParser) -> None:
     add("--growth", type=float, metavar="G", help="largest ratio of neighbouring sizes (default: 1.3)")
     add("--pixel-size", type=float, metavar="L", help="length of a pixel in the unit of the mesh (default: 1)")
     add("--effort", choices=("fast", "normal", "best"), help="how far the mesh is optimised (default: normal)")
+    add("--periodic", choices=("none", "x", "y", "xy"), help="match the nodes of opposite sides, for a periodic cell")
     add("--threads", type=int, metavar="N", help="threads of the meshing stage (default: 1)")
 
 
