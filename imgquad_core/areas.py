@@ -168,7 +168,10 @@ def _conjugate_gradients(matrix: Any, right: Floats) -> Floats:
         if np.abs(residual).max(initial=0.0) <= goal:
             break
         image = matrix @ direction
-        alpha = rho / float(direction @ image)
+        curvature = float(direction @ image)
+        if not curvature > 1e-12 * float(direction @ direction):
+            break
+        alpha = rho / curvature
         solution += alpha * direction
         residual -= alpha * image
         scaled = residual / diagonal

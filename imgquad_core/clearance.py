@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.curves import Flags, Floats, Ints
+from imgquad_core.features import add_up
 from imgquad_core.jit import kernel
 
 UNITS = 16384.0  #: grid steps a pixel
@@ -51,6 +52,7 @@ def find_conflicts(points: Floats, segments: Ints, chain: Ints, is_new: Flags, s
         start, items = _bucket_segments(points, segments, cell, n_across, n_up)
         grid = np.round(points * UNITS).astype(np.int64)
         _compare_in_cells(grid, points, segments, chain, is_new, start, items, marks)
+        marks[(points[segments[:, 0]] == points[segments[:, 1]]).all(axis=1)] = CROSSING
     return marks
 
 
@@ -61,13 +63,14 @@ def _bucket_segments(points: Floats, segments: Ints, cell: float, n_across: int,
     items = np.empty(0, np.int64)
     for fill in range(2):
         for k in range(len(segments)):
-            a, b = points[segments[k, 0]], points[segments[k, 1]]
-            pieces = int(max(abs(b[0] - a[0]), abs(b[1] - a[1])) / cell) + 1
-            margin = _ROOM * np.hypot(b[0] - a[0], b[1] - a[1])
+            ax, ay = points[segments[k, 0], 0], points[segments[k, 0], 1]
+            dx, dy = points[segments[k, 1], 0] - ax, points[segments[k, 1], 1] - ay
+            pieces = int(max(abs(dx), abs(dy)) / cell) + 1
+            margin = _ROOM * np.sqrt(dx * dx + dy * dy)
             done_left = done_right = done_low = done_high = -1
             for p in range(pieces):
-                x0, x1 = a[0] + (b[0] - a[0]) * p / pieces, a[0] + (b[0] - a[0]) * (p + 1) / pieces
-                y0, y1 = a[1] + (b[1] - a[1]) * p / pieces, a[1] + (b[1] - a[1]) * (p + 1) / pieces
+                x0, x1 = ax + dx * p / pieces, ax + dx * (p + 1) / pieces
+                y0, y1 = ay + dy * p / pieces, ay + dy * (p + 1) / pieces
                 left = max(int((min(x0, x1) - margin) / cell), 0)
                 right = min(int((max(x0, x1) + margin) / cell), n_across - 1)
                 low = max(int((min(y0, y1) - margin) / cell), 0)
@@ -84,7 +87,7 @@ def _bucket_segments(points: Floats, segments: Ints, cell: float, n_across: int,
                             start[at] += 1
                 done_left, done_right, done_low, done_high = left, right, low, high
         if not fill:
-            start = np.cumsum(start)
+            add_up(start)
             items = np.empty(start[-1], np.int64)
     return start, items
 
@@ -106,12 +109,17 @@ def _compare_in_cells(
             for j in range(i + 1, start[at + 1]):
                 other = items[j]
                 if is_new[chain[k]] or is_new[chain[other]]:
-                    mark = _compare(grid, points, segments[k], segments[other])
-                    marks[k], marks[other] = max(marks[k], mark), max(marks[other], mark)
-    for k in range(len(segments)):
-        a, b = grid[segments[k, 0]], grid[segments[k, 1]]
-        if a[0] == b[0] and a[1] == b[1]:
-            marks[k] = CROSSING
+                    mark = _compare(
+                        grid, points, segments[k, 0], segments[k, 1], segments[other, 0], segments[other, 1]
+                    )
+                    _raise(marks, k, mark)
+                    _raise(marks, other, mark)
+
+
+@kernel
+def _raise(marks: NDArray[np.uint8], k: int, mark: int) -> None:
+    if marks[k] < mark:
+        marks[k] = mark
 
 
 @kernel
@@ -123,9 +131,8 @@ def _any_new(chain: Ints, is_new: Flags, items: Ints, low: int, high: int) -> bo
 
 
 @kernel
-def _compare(grid: Ints, points: Floats, s: Ints, t: Ints) -> int:
-    """FREE, CLOSE or CROSSING for two segments."""
-    a, b, c, d = s[0], s[1], t[0], t[1]
+def _compare(grid: Ints, points: Floats, a: int, b: int, c: int, d: int) -> int:
+    """FREE, CLOSE or CROSSING for the segments a b and c d."""
     if a == c or a == d or b == c or b == d:
         if (a == c and b == d) or (a == d and b == c):
             return CROSSING
@@ -168,7 +175,8 @@ def _is_close(points: Floats, a: int, b: int, c: int, d: int) -> bool:
     """Is c or d nearer to the segment a b than a quarter of its length?"""
     dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     length2 = dx * dx + dy * dy
-    for p in (c, d):
+    for k in range(2):
+        p = d if k else c
         x, y = points[p, 0] - points[a, 0], points[p, 1] - points[a, 1]
         t = min(max((x * dx + y * dy) / (length2 + 1e-300), 0.0), 1.0)
         if (x - t * dx) ** 2 + (y - t * dy) ** 2 < _ROOM * _ROOM * length2:
@@ -196,14 +204,16 @@ def mark_sharp(
             if _sector(points, chain_points[i], before, chain_points[i + 1]) < least:
                 k = i - c
                 previous = k - 1 if i > first else last - 1 - c
-                marks[k], marks[previous] = max(marks[k], SHARP), max(marks[previous], SHARP)
+                _raise(marks, k, SHARP)
+                _raise(marks, previous, SHARP)
     for v in range(len(node_offsets) - 1):
         for i in range(node_offsets[v], node_offsets[v + 1]):
             k, p = _first_segment(sockets[i], chain_points, offsets)
             for j in range(i + 1, node_offsets[v + 1]):
                 other, q = _first_segment(sockets[j], chain_points, offsets)
                 if _sector(points, v, p, q) < least:
-                    marks[k], marks[other] = max(marks[k], SHARP), max(marks[other], SHARP)
+                    _raise(marks, k, SHARP)
+                    _raise(marks, other, SHARP)
 
 
 @kernel

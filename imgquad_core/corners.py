@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imgquad_core.curves import Curves, Flags, Floats, line_beside, start_closed_at
+from imgquad_core.curves import Curves, Flags, Floats, line_beside, started_at
 from imgquad_core.fitting import quadratic_at
 from imgquad_core.jit import kernel
 
@@ -23,8 +23,8 @@ _APART = 4.2  # px of arc between corners
 _AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
 
 
-def find_corners(curves: Curves) -> Flags:
-    """Find sharp corners; closed chains that have some are turned round, in place, to start at one.
+def find_corners(curves: Curves) -> tuple[Curves, Flags]:
+    """Find sharp corners; closed chains that have some are turned round to start at one.
 
     Parameters
     ----------
@@ -33,12 +33,12 @@ def find_corners(curves: Curves) -> Flags:
 
     Returns
     -------
-    bool, shape (n,)
+    Curves
+        The same chains.
+    is_corner : bool, shape (n,)
         Dense points that are corners; where a closed chain starts at one, its last point too.
     """
-    is_corner = _find(curves)
-    start_closed_at(curves, is_corner)
-    return is_corner
+    return started_at(curves, _find(curves))
 
 
 def place_corners(curves: Curves, is_corner: Flags, room: Floats, points: Floats) -> None:
@@ -72,8 +72,8 @@ def _find(curves: Curves) -> Flags:
             straight, dx, dy = _corner_at(curves, c, i, _SIDE)
             if straight <= 0.0:
                 continue
-            n, middle = _gather(curves, c, i, x, y, s)
-            gain = quadratic_at(x[:n], y[:n], s[:n], q[:n], middle, _SIDE, sums)[2]
+            middle = _gather(curves, c, i, x, y, s)
+            gain = quadratic_at(x, y, s, q, middle, _SIDE, sums)[2]
             if gain >= _UNLIKE:
                 j = _nearest(curves, c, i, curves.raw[i, 0] + dx, curves.raw[i, 1] + dy)
                 score[j] = max(score[j], gain + straight)
@@ -99,8 +99,8 @@ def _corner_at(curves: Curves, c: int, i: int, far: float) -> tuple[float, float
 
 
 @kernel
-def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> tuple[int, int]:
-    """Copy the points around i; gives their number and the place of i among them."""
+def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> int:
+    """Copy the points around i; gives the place of i among them."""
     first, last = curves.offsets[c], curves.offsets[c + 1] - 1
     low = high = i
     if curves.ends[c, 0] >= 0:
@@ -115,7 +115,8 @@ def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> 
         j = first + (k - first) % n if curves.ends[c, 0] < 0 else k
         x[k - low], y[k - low] = curves.raw[j, 0], curves.raw[j, 1]
         s[k - low] = curves.arc[j] + (length * ((k - first) // n) if curves.ends[c, 0] < 0 else 0.0)
-    return high - low + 1, i - low
+    s[high - low + 1] = np.inf
+    return i - low
 
 
 @kernel

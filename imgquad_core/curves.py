@@ -96,7 +96,8 @@ def sample_weights(points: Floats, offsets: Ints) -> Floats:
             if this < 0:
                 continue
             if this != kind:
-                run[begin:i] = length
+                for k in range(begin, i):
+                    run[k] = length
                 begin, kind, length = i, this, 0
             length += 1
         for i in range(first, last + 1):
@@ -121,14 +122,13 @@ def pin_ends(points: Floats, curves: Curves, node: Floats) -> None:
     for c in range(len(curves.ends)):
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
         if curves.ends[c, 0] < 0:
-            points[last] = points[first]
+            points[last, 0], points[last, 1] = points[first, 0], points[first, 1]
             continue
-        start, end = node[curves.ends[c, 0]], node[curves.ends[c, 1]]
-        points[first], points[last] = start, end
-        if curves.is_frame[c]:
-            for i in range(first + 1, last):
-                t = curves.arc[i] / curves.arc[last]
-                points[i] = start + t * (end - start)
+        v, w = curves.ends[c, 0], curves.ends[c, 1]
+        for k in range(2):
+            points[first, k], points[last, k] = node[v, k], node[w, k]
+            for i in range(first + 1, last if curves.is_frame[c] else first):
+                points[i, k] = node[v, k] + curves.arc[i] / curves.arc[last] * (node[w, k] - node[v, k])
 
 
 def per_point(curves: Curves, values: NDArray[Any]) -> NDArray[Any]:
@@ -173,20 +173,16 @@ def line_beside(
     return n, x, y, tx, ty, np.sqrt(max(spread, 0.0) * g / n)
 
 
-@kernel
-def start_closed_at(curves: Curves, flags: Flags) -> None:
-    """Turn closed chains round, in place, so that they start at their first flagged point (and so the flags)."""
-    for c in range(len(curves.ends)):
-        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
-        if curves.ends[c, 0] >= 0 or flags[first] or not np.any(flags[first:last]):
-            continue
-        by = np.argmax(flags[first:last])
-        points, marks, weight = curves.raw[first:last].copy(), flags[first:last].copy(), curves.weight[first:last].copy()
-        n = last - first
-        for k in range(n + 1):
-            curves.raw[first + k] = points[(k + by) % n]
-            flags[first + k] = marks[(k + by) % n]
-            curves.weight[first + k] = weight[(k + by) % n]
-        for i in range(first + 1, last + 1):
-            step = curves.raw[i] - curves.raw[i - 1]
-            curves.arc[i] = curves.arc[i - 1] + np.hypot(step[0], step[1])
+def started_at(curves: Curves, flags: Flags) -> tuple[Curves, Flags]:
+    """Turn closed chains round so that they start at their first flagged point, and the flags with them."""
+    size = np.diff(curves.offsets)
+    first = curves.offsets[:-1]
+    closed = curves.ends[:, 0] < 0
+    flagged = np.where(flags, np.arange(len(flags)), len(flags))
+    by = np.minimum.reduceat(flagged, first) - first
+    by[~closed | (by >= size)] = 0
+    period = per_point(curves, np.where(closed, size - 1, size))
+    within = np.arange(len(flags)) - per_point(curves, first)
+    order = per_point(curves, first) + (within + per_point(curves, by)) % period
+    raw = curves.raw[order]
+    return curves._replace(raw=raw, arc=arc_lengths(raw, curves.offsets), weight=curves.weight[order]), flags[order]

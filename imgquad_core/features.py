@@ -41,7 +41,8 @@ def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float
     while True:
         ids = np.arange(len(points)) if stride == 1 else _every(curves.offsets, stride)
         cell = max(level / 2, 1.0)
-        start, items, n_across = bucket(points, ids, cell)
+        n_across, n_up = (points.max(axis=0) / cell).astype(np.int64) + 1
+        start, items = bucket(points, ids, cell, n_across, n_up)
         _nearest_foreign(points, curves, chain, ids, start, items, n_across, cell, level, bend, lfs)
         if stride > 1:
             _spread(ids, stride, chain, lfs)
@@ -60,14 +61,12 @@ def _every(offsets: Ints, stride: int) -> Ints:
             n += 1
         ids[n] = offsets[c + 1] - 1
         n += 1
-    return ids[:n].copy()
+    return ids[:n]
 
 
 @kernel
-def bucket(points: Floats, ids: Ints, cell: float) -> tuple[Ints, Ints, int]:
-    """Sort the points `ids` into square cells: CSR offsets, items, number of cells across."""
-    n_across = int(np.max(points[:, 0]) / cell) + 1
-    n_up = int(np.max(points[:, 1]) / cell) + 1
+def bucket(points: Floats, ids: Ints, cell: float, n_across: int, n_up: int) -> tuple[Ints, Ints]:
+    """Sort the points `ids` into square cells: CSR offsets, items."""
     start = np.zeros(n_across * n_up + 1, np.int64)
     items = np.empty(len(ids), np.int64)
     for fill in range(2):
@@ -80,8 +79,15 @@ def bucket(points: Floats, ids: Ints, cell: float) -> tuple[Ints, Ints, int]:
             else:
                 start[at] += 1
         if not fill:
-            start = np.cumsum(start)
-    return start, items, n_across
+            add_up(start)
+    return start, items
+
+
+@kernel
+def add_up(counts: Ints) -> None:
+    """Replace counts by their running sum."""
+    for k in range(1, len(counts)):
+        counts[k] += counts[k - 1]
 
 
 @kernel
@@ -123,7 +129,7 @@ def _nearest_foreign(
     for i in ids:
         if lfs[i] < np.inf:
             continue
-        x, y = points[i]
+        x, y = points[i, 0], points[i, 1]
         column, row = int(x / cell), int(y / cell)
         best = reach * reach
         found = False
@@ -135,7 +141,8 @@ def _nearest_foreign(
                 for k in range(column - ring, column + ring + 1, max(step, 1)):
                     if k < 0 or k >= n_across:
                         continue
-                    for j in items[start[r * n_across + k] : start[r * n_across + k + 1]]:
+                    for at in range(start[r * n_across + k], start[r * n_across + k + 1]):
+                        j = items[at]
                         d2 = (points[j, 0] - x) ** 2 + (points[j, 1] - y) ** 2
                         if d2 < best and _arc_between(curves, chain[i], i, chain[j], j) > bend * np.sqrt(d2):
                             best = d2

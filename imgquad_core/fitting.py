@@ -29,7 +29,8 @@ def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: 
     sums[0:5] of u^0..u^4, [5:8] of x, u x, u^2 x, [8:11] of y, u y, u^2 y, [11:14] of x x, x y, y y. Gives the sum of the bell
     alone, over the samples that count.
     """
-    sums[:] = 0.0
+    for k in range(14):
+        sums[k] = 0.0
     count = 0.0
     for step in (-1, 1):
         j = i if step == 1 else i - 1
@@ -99,7 +100,7 @@ def _choose_windows(
         i = min(k, last)
         w[i] = min(windows[0], widest)
         failures = 0
-        for candidate in windows[1:]:
+        for candidate in windows:
             if candidate > widest or (candidate > _DARING and failures > 1):
                 break
             _, _, rms = quadratic_at(x, y, s, q, i, candidate, sums)
@@ -146,7 +147,7 @@ def _extend(points: Floats, arc: Floats, weight: Floats, first: int, last: int, 
             i = first + k
             out[0, at], out[1, at], out[2, at] = points[i, 0], points[i, 1], arc[i]
         out[3, at] = weight[i]
-    out[2, before + n + after + 1 :] = np.inf
+    out[2, before + n + after + 1] = np.inf
     return before
 
 
@@ -184,7 +185,7 @@ def fit_pieces(
     w = np.empty(3 * longest + 4)
     sums = np.empty(14)
     for k in range(len(pieces)):
-        first, last = pieces[k]
+        first, last = pieces[k, 0], pieces[k, 1]
         n = last - first
         length = arc[last] - arc[first]
         widest = min(length / 4 if closed[k] else length / 2, windows[-1])
@@ -198,5 +199,5 @@ def fit_pieces(
             fitted[first + j, 0] += dx
             fitted[first + j, 1] += dy
         if closed[k]:
-            fitted[last] = fitted[first]
+            fitted[last, 0], fitted[last, 1] = fitted[first, 0], fitted[first, 1]
     return fitted

@@ -47,7 +47,7 @@ def _place(curves: Curves, room: Floats, width: float, height: float, windows: F
     for v in range(len(placed)):
         if curves.node_kind[v] != _JUNCTION:
             continue
-        x, y = curves.node[v]
+        x, y = curves.node[v, 0], curves.node[v, 1]
         on_side, on_end = x == 0 or x == width, y == 0 or y == height
         if on_side or on_end:
             dx, dy = _slide(curves, v, 0 if on_end else 1, windows)
@@ -64,7 +64,8 @@ def _place(curves: Curves, room: Floats, width: float, height: float, windows: F
 @kernel
 def _limit(curves: Curves, room: Floats, v: int) -> float:
     limit = _FARTHEST
-    for socket in curves.sockets[curves.node_offsets[v] : curves.node_offsets[v + 1]]:
+    for k in range(curves.node_offsets[v], curves.node_offsets[v + 1]):
+        socket = curves.sockets[k]
         c = socket // 2
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
         limit = min(limit, _ROOM * curves.arc[last], room[last if socket % 2 else first])
@@ -81,7 +82,8 @@ def _end(curves: Curves, socket: int) -> int:
 def _meet(curves: Curves, v: int) -> tuple[float, float]:
     """Shift of a node to the point nearest to the lines of its chains."""
     a, b, d, p, q = _PULL, 0.0, _PULL, 0.0, 0.0
-    for socket in curves.sockets[curves.node_offsets[v] : curves.node_offsets[v + 1]]:
+    for k in range(curves.node_offsets[v], curves.node_offsets[v + 1]):
+        socket = curves.sockets[k]
         n, x, y, tx, ty, _ = line_beside(curves, socket // 2, _end(curves, socket), 1 - 2 * (socket % 2), _NEAR, _FAR)
         if n < 3:
             continue
@@ -96,7 +98,8 @@ def _meet(curves: Curves, v: int) -> tuple[float, float]:
 def _slide(curves: Curves, v: int, axis: int, windows: Floats) -> tuple[float, float]:
     """Shift of a node along the border, to where the lines of its inner chains meet it."""
     total, count = 0.0, 0
-    for socket in curves.sockets[curves.node_offsets[v] : curves.node_offsets[v + 1]]:
+    for k in range(curves.node_offsets[v], curves.node_offsets[v + 1]):
+        socket = curves.sockets[k]
         if curves.is_frame[socket // 2]:
             continue
         for far in windows:

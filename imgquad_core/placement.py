@@ -65,7 +65,9 @@ def place_nodes(
             n_nodes += 2
         n_nodes += 8 + int(cost[curves.offsets[c + 1] - 1]) * 2
     offsets = np.zeros(len(exact) + 1, np.int64)
-    at = np.empty(n_nodes + 16 * np.sum(is_corner))
+    for c in range(len(is_corner)):
+        n_nodes += 16 * is_corner[c]
+    at = np.empty(n_nodes)
     corner = np.zeros(len(at), np.bool_)
     for c in range(len(exact)):
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
@@ -73,7 +75,9 @@ def place_nodes(
         at[n] = first
         corner[n] = is_corner[first]
         begin = first
-        pieces = 1 + np.sum(is_corner[first + 1 : last])
+        pieces = 1
+        for i in range(first + 1, last):
+            pieces += is_corner[i]
         for i in range(first + 1, last + 1):
             if i < last and not is_corner[i] and not exact[c]:
                 continue
@@ -84,7 +88,7 @@ def place_nodes(
             corner[n] = is_corner[i]
             begin = i
         offsets[c + 1] = n + 1
-    return Placement(offsets, at[: offsets[-1]].copy(), corner[: offsets[-1]].copy())
+    return Placement(offsets, at[: offsets[-1]], corner[: offsets[-1]])
 
 
 @kernel
@@ -93,7 +97,7 @@ def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, le
     total = 0.5 * (cost[end] - cost[begin])
     length = curves.arc[end] - curves.arc[begin]
     if total > _LONG and length > 2 * _COARSE * total * limit[begin]:
-        return max(2 * int(round(0.5 * total)), 2 * ((least + 1) // 2))
+        return max(2 * int(0.5 * total + 0.5), 2 * ((least + 1) // 2))
     return max(int(np.ceil(total - 0.3)), least)
 
 

@@ -114,9 +114,8 @@ def smooth_boundaries(graph: BoundaryGraph, options: SmoothingOptions | None = N
         that neither cross nor touch. Coordinates are multiples of 2^-14 px.
     """
     options = options or SmoothingOptions()
-    curves = curves_of(graph)
+    curves, is_corner = find_corners(curves_of(graph))
     limit = per_point(curves, _asked_sizes(graph, options))
-    is_corner = find_corners(curves)
     room = _room(curves, is_corner, options.max_shift)
     node = place_junctions(curves, room, graph.shape)
     smooth = _smooth(curves, node, is_corner, room)

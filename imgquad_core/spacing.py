@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imgquad_core.curves import Curves, Floats
+from imgquad_core.curves import Curves, Floats, Ints
 from imgquad_core.features import local_feature_size
 from imgquad_core.jit import kernel
 
@@ -50,7 +50,7 @@ def edge_sizes(
     reach = min(float(limit.max()) / _ACROSS, float(np.hypot(*shape)))
     lfs = local_feature_size(points, curves, reach, _BEND)
     size = np.minimum(limit, _ACROSS * lfs)
-    _limit_turn(points, curves.offsets, curves.arc, is_corner, size)
+    _limit_turn(points, curves.offsets, curves.arc, np.cumsum(is_corner), size)
     size = np.minimum(np.maximum(size, _FINEST), limit)
     return grade(size, points, curves, growth, edge_ratio, shape)
 
@@ -67,7 +67,8 @@ def grade(
 
 
 @kernel
-def _limit_turn(points: Floats, offsets: Floats, arc: Floats, is_corner: Floats, size: Floats) -> None:
+def _limit_turn(points: Floats, offsets: Floats, arc: Floats, corners: Ints, size: Floats) -> None:
+    """`corners` counts the corners up to each point."""
     for c in range(len(offsets) - 1):
         first, last = offsets[c], offsets[c + 1] - 1
         back = ahead = first
@@ -76,10 +77,10 @@ def _limit_turn(points: Floats, offsets: Floats, arc: Floats, is_corner: Floats,
                 back += 1
             while ahead < last and arc[ahead] - arc[i] < _OVER:
                 ahead += 1
-            if np.any(is_corner[back : ahead + 1]):
+            if corners[ahead] > corners[max(back - 1, 0)]:
                 continue
-            ux, uy = points[i] - points[back]
-            vx, vy = points[ahead] - points[i]
+            ux, uy = points[i, 0] - points[back, 0], points[i, 1] - points[back, 1]
+            vx, vy = points[ahead, 0] - points[i, 0], points[ahead, 1] - points[i, 1]
             turn = abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
             apart = 0.5 * (np.hypot(ux, uy) + np.hypot(vx, vy))
             if turn * size[i] > _TURN * apart:
@@ -132,7 +133,8 @@ def _grade_chains(size: Floats, arc: Floats, offsets: Floats, ends: Floats, slop
         first, last = offsets[c], offsets[c + 1] - 1
         for _ in range(1 if ends[c, 0] >= 0 else 2):  # a closed chain needs the second round
             if ends[c, 0] < 0:
-                size[first] = size[last] = min(size[first], size[last])
+                size[first] = min(size[first], size[last])
+                size[last] = size[first]
             for i in range(first + 1, last + 1):
                 size[i] = min(size[i], size[i - 1] + slope * (arc[i] - arc[i - 1]))
             for i in range(last - 1, first - 1, -1):
