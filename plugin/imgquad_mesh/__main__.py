@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from imgquad_core.errors import ImgquadError, InputError, QualityError
-from imgquad_mesh.cli import demo, run
+from imgquad_mesh.cli import demo, filters, run, script
 
 GOOD, BUG, BAD_INPUT, LIMIT_NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
-COMMANDS = (run, demo)
+COMMANDS = (run, demo, script, filters)
 
 
 class Parser(argparse.ArgumentParser):

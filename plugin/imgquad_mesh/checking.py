@@ -14,14 +14,15 @@ from imgquad_mesh.catalogue import PRINTED_TYPES, MissingMeshLab, meshlab_filter
 from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, ScriptValue
 from imgquad_mesh.names import all_meshlab_names, meshlab_function, nearest
 from imgquad_mesh.spec import Filter, Parameter, filters, find_filter, python_name
-from imgquad_mesh.steps import STEPS, script_path
+from imgquad_mesh.steps import STEPS, check_output, script_path
 from imgquad_mesh.texts import options_from
 
 #: types in scripts that stand for the same kind of value
 _SAME_TYPE = {"RichOpenFile": "RichString", "RichSaveFile": "RichString"}
 
-#: MeshLab's parameters that name files, whatever their type in the script
-_FILE_PARAMETER = re.compile(r"file|path|^textname$")
+#: MeshLab's parameters that name files, whatever their type in the script; a texture's name has no folder
+_FILE_PARAMETER = re.compile(r"file|path")
+_BARE_FILE_PARAMETER = ("textname", "texturename")
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,7 @@ def _own_value(script: Script, spec: Filter, parameter: Parameter, given: Script
                                   f"it must be {parameter.script_type}")  # fmt: skip
     try:
         if parameter.field == "file_name":
-            script_path(str(given.value), folder)
+            check_output(spec.function, str(given.value), folder)
         return parameter.checked(given.value)
     except InputError as error:
         _fail(script, given.line, f"filter {spec.name!r}: {error}")
@@ -161,6 +162,8 @@ def _meshlab_step(
 
 def _file_checked(script: Script, each: ScriptFilter, given: ScriptParameter, folder: Path) -> ScriptValue:
     """Return the value, a file's name as an absolute path inside the script's folder."""
+    if python_name(given.name) in _BARE_FILE_PARAMETER and re.search(r"[/\\]", str(given.value)):
+        _fail(script, given.line, f"filter {each.name!r}: {given.value!r} must be a file's name without a folder")
     is_file = given.kind in ("RichOpenFile", "RichSaveFile") or _FILE_PARAMETER.search(python_name(given.name))
     if not is_file or not isinstance(given.value, str) or not given.value:
         return given.value

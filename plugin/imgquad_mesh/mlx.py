@@ -6,6 +6,7 @@ everything that they would drop is a `ScriptError` with file and line.
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -108,8 +109,7 @@ def read_script(path: str | Path) -> Script:
     parser.setContentHandler(handler)
     parser.setProperty("http://xml.org/sax/properties/lexical-handler", handler)
     try:
-        parser.feed(data)
-        parser.close()
+        parser.parse(io.BytesIO(data))
     except ScriptError:
         raise
     except DefusedXmlException as error:
@@ -316,6 +316,7 @@ def _attributes(parameter: ScriptParameter) -> str:
     if parameter.choices:
         attrs |= {"enum_cardinality": str(len(parameter.choices))}
         attrs |= {f"enum_val{i}": text for i, text in enumerate(parameter.choices)}
+    attrs |= {"RichOpenFile": {"exts_cardinality": "0"}, "RichSaveFile": {"ext": ""}}.get(parameter.kind, {})
     attrs |= {key: text for key, text in (("description", parameter.label), ("tooltip", parameter.tooltip)) if text}
     return " ".join(f"{key}={quoteattr(text)}" for key, text in attrs.items())
 

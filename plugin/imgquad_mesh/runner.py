@@ -22,7 +22,8 @@ from imgquad_mesh.layer import Layer, load_layer, save_layer
 #: filters that leave points and faces as they are: nothing to save before the next one
 _HARMLESS = ("get_", "compute_selection", "compute_color", "compute_scalar", "compute_normal", "set_mesh")
 
-_PATIENCE = 120.0  #: seconds for starting, reading and writing, whatever the deadline of a filter
+_STARTING = 120.0  #: seconds for the process to start and take the first layer, at least
+_MOVING = 20.0  #: seconds for taking a mesh out or putting one in, at least
 
 
 class MeshLabError(ImgquadError):
@@ -64,6 +65,7 @@ class MeshLabProcess:
         self._answers: queue.Queue[str] = queue.Queue()
         threading.Thread(target=_pass_lines, args=(self._process.stdout, self._answers), daemon=True).start()
         self._count = 0
+        self._started = False
         self._saved: Path | None = None
 
     def __enter__(self) -> MeshLabProcess:
@@ -89,7 +91,7 @@ class MeshLabProcess:
             assert self._process.stdin is not None
             self._process.stdin.write(line)
             self._process.stdin.flush()
-            answer = self._answers.get(timeout=self.deadline if do == "apply" else max(self.deadline, _PATIENCE))
+            answer = self._answers.get(timeout=self._patience(do))
         except queue.Empty:
             self._process.kill()
             raise MeshLabError(
@@ -104,6 +106,12 @@ class MeshLabProcess:
         if "error" in content:
             raise MeshLabError(" ".join(content["error"].split()))
         return content["values"]
+
+    def _patience(self, do: str) -> float:
+        if not self._started:
+            self._started = True
+            return max(self.deadline, _STARTING)
+        return self.deadline if do == "apply" else max(self.deadline, _MOVING)
 
     def _exit_reason(self) -> str:
         code = self._process.wait()

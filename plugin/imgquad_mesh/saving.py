@@ -18,6 +18,14 @@ from imgquad_mesh.steps import State
 #: formats that keep polygons when MeshLab writes them; its PLY has triangles only
 _MESHLAB_POLYGONS = (".obj", ".off")
 
+#: formats that only MeshLab writes here
+_MESHLAB_ONLY = (".3ds", ".3mf", ".ctm", ".dae", ".u3d", ".wrl", ".x3d")
+
+
+def check_saving(path: Path) -> None:
+    """Raise `InputError` now if the mesh at a script's end could not be written to `path`."""
+    check_target(path, (*mesh_extensions(), *_MESHLAB_ONLY))
+
 
 def save_current(state: State, process: MeshLabProcess | None, path: Path) -> None:
     """Write the current layer.

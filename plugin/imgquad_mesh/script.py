@@ -20,7 +20,7 @@ from imgquad_mesh.layer import Layer, layer_of, write_ply
 from imgquad_mesh.meshlab import add_to
 from imgquad_mesh.mlx import read_script
 from imgquad_mesh.runner import MeshLabError, MeshLabProcess
-from imgquad_mesh.saving import read_grid, save_current
+from imgquad_mesh.saving import check_saving, read_grid, save_current
 from imgquad_mesh.steps import STEPS, LayerList, Meshes, State
 
 Progress: TypeAlias = Callable[[str, int, int], None]
@@ -138,6 +138,8 @@ def run_script(
     base = Path(folder) if folder is not None else Path(path).resolve().parent
     steps = checked_steps(script, base)
     target = Path(output) if output is not None else None
+    if target is not None:
+        check_saving(target)
     with ExitStack() as stack:
         runner = _Runner(stack, State(LayerList(), image, base), deadline)
         runner.load(meshset, mesh)

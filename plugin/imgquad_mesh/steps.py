@@ -327,14 +327,12 @@ def _list_sets(state: State, options: NoOptions) -> dict[str, Any]:
 
 def _save_mesh(state: State, options: MeshFileOptions) -> dict[str, Any]:
     path = script_path(options.file_name, state.folder)
-    check_target(path, mesh_extensions())
     write_mesh_file(state.mesh(), path)
     return {"file": str(path)}
 
 
 def _save_labels(state: State, options: LabelFileOptions) -> dict[str, Any]:
     path = script_path(options.file_name, state.folder)
-    check_target(path, (".npy", ".png"))
     write_labels(state.need_labels(), path)
     return {"file": str(path)}
 
@@ -345,6 +343,12 @@ def script_path(name: str, folder: Path) -> Path:
     if not name or not path.is_relative_to(folder.resolve()):
         raise InputError(f"the file {name!r} is outside {folder.resolve()}, the script's folder; name one inside it")
     return path
+
+
+def check_output(function: str, name: str, folder: Path) -> None:
+    """Raise `InputError` now if a filter could not write the file that a script names."""
+    labels = function == "export_label_image_to_file"
+    check_target(script_path(name, folder), (".npy", ".png") if labels else mesh_extensions())
 
 
 class Step(NamedTuple):
