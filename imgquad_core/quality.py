@@ -162,11 +162,10 @@ def inner_nodes(mesh: QuadMesh) -> NDArray[np.bool_]:
     return inner
 
 
-def sector_angles(mesh: QuadMesh) -> Floats:
-    """Return for each corner the angle of its sector of material between two boundary lines, shape (n_quads, 4).
+def sectors_of(mesh: QuadMesh) -> Ids:
+    """Return the number of the sector that each corner is in, shape (n_quads, 4).
 
-    A sector is all of a node's corners that follow one another without a boundary line between them: its angle is what
-    the boundary forces on the mesh. It is 360 degrees at an inner node.
+    A sector is all of a node's corners that follow one another without a boundary line between them.
     """
     #   q's corner at v |/  h runs from v to w, its twin from w to v:
     #     v ---- h ---> w   corner h lies left of it at v,
@@ -177,8 +176,17 @@ def sector_angles(mesh: QuadMesh) -> Floats:
     n = 4 * mesh.n_quads
     linked = coo_array((np.ones(len(h), bool), (h, beside)), shape=(n, n))
     _, sector = connected_components(linked, directed=False)
-    angles = corner_angles(mesh.points, mesh.quads).ravel()
-    return np.asarray(np.bincount(sector, weights=angles)[sector].reshape(-1, 4))
+    return np.asarray(sector, np.int64).reshape(-1, 4)
+
+
+def sector_angles(mesh: QuadMesh) -> Floats:
+    """Return for each corner the angle of its sector of material between two boundary lines, shape (n_quads, 4).
+
+    It is what the boundary forces on the mesh, and 360 degrees at an inner node.
+    """
+    sector = sectors_of(mesh)
+    angles = corner_angles(mesh.points, mesh.quads)
+    return np.asarray(np.bincount(sector.ravel(), weights=angles.ravel())[sector])
 
 
 def best_sine(sector: Floats) -> Floats:

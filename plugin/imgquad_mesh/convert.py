@@ -13,7 +13,7 @@ from pyvista.core.errors import MissingDataError
 from imgquad_core.errors import InputError
 
 if TYPE_CHECKING:
-    from imgquad_core.model import QuadMesh
+    from imgquad_core.model import Materials, QuadMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +35,11 @@ class Placement:
     def mirrored(self) -> bool:
         """Whether a counter-clockwise quad of the picture runs clockwise when seen from above."""
         return bool(np.cross(*self.axes)[2] < 0)
+
+    @property
+    def pixel_size(self) -> float:
+        """Length of the shorter side of a pixel."""
+        return float(np.linalg.norm(self.axes, axis=1).min())
 
     def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return points in space, shape (n, 3), of points in pixels, shape (n, 2)."""
@@ -64,7 +69,7 @@ def image_array(image: pv.ImageData, scalars: str | None = None) -> NDArray[Any]
     pyvista.core.errors.MissingDataError
         It has no array at all.
     """
-    name, association = _scalars_of(image, scalars)
+    name, association = scalars_of(image, scalars)
     u, v = flat_axes(image, name, association)
     values = np.asarray(image.point_data[name] if association == "point" else image.cell_data[name])
     counts = _pixel_counts(image, association)
@@ -73,7 +78,7 @@ def image_array(image: pv.ImageData, scalars: str | None = None) -> NDArray[Any]
 
 def image_placement(image: pv.ImageData, scalars: str | None = None) -> Placement:
     """Return where the pixels of a flat image lie; a point of the image is the centre of its pixel."""
-    name, association = _scalars_of(image, scalars)
+    name, association = scalars_of(image, scalars)
     plane = list(flat_axes(image, name, association))
     matrix = np.asarray(image.index_to_physical_matrix)
     first = np.array(image.extent[::2], float)
@@ -107,9 +112,7 @@ def to_grid(mesh: QuadMesh, placement: Placement = PLAIN) -> pv.UnstructuredGrid
     grid = pv.UnstructuredGrid({pv.CellType.QUAD: quads}, placement.place(mesh.points))
     grid.cell_data["region"] = mesh.quad_region.astype(np.int32)
     grid.cell_data["material"] = mesh.quad_material
-    grid.field_data["material_numbers"] = mesh.materials.labels
-    grid.field_data["material_names"] = list(mesh.materials.names)
-    grid.field_data["material_colors"] = mesh.materials.colors
+    put_materials(grid, mesh.materials)
     grid.set_active_scalars("material", preference="cell")
     return grid
 
@@ -132,8 +135,25 @@ def chain_lines(
     return poly
 
 
-def _scalars_of(image: pv.ImageData, scalars: str | None) -> tuple[str, str]:
+def put_materials(dataset: pv.DataSet, materials: Materials) -> None:
+    """Store what the materials are called in the field arrays of a dataset, in place."""
+    dataset.field_data["material_numbers"] = materials.labels
+    dataset.field_data["material_names"] = list(materials.names)
+    dataset.field_data["material_colors"] = materials.colors
+
+
+def materials_of(dataset: pv.DataSet) -> Materials:
+    """Return what `put_materials` stored."""
+    from imgquad_core.model import Materials
+
+    fields = dataset.field_data
+    return Materials(fields["material_numbers"], tuple(map(str, fields["material_names"])), fields["material_colors"])
+
+
+def scalars_of(image: pv.ImageData, scalars: str | None = None) -> tuple[str, str]:
+    """Return the name and the association ("point" or "cell") of the array that is processed."""
     if scalars is None:
+        image = image.copy(deep=False)  # what is chosen must not become active in the input
         pv.set_default_active_scalars(image)
         scalars = image.active_scalars_name
         if scalars is None:

@@ -1,0 +1,146 @@
+"""Clean-up and relaxation of a mesh that is there already: its boundaries stay, point by point.
+
+The mesh is cut at the boundaries into faces that share no point, which is what the kernels of the mesher work on. Each
+face keeps its old quads unless the new ones are better.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .batches import faces_only, in_batches, joined
+from .errors import InputError
+from .frontal import wanted_quads
+from .halfedge import corners_at
+from .model import PointKind, QuadMesh
+from .quality import corner_angles, sectors_of
+from .relaxation import BAD, GOOD, laplace, newton, rings_of, untangle, worst_of_faces
+from .splitting import INNER_VALENCE, FaceQuads
+from .topology import CleanUp, clean_up
+
+Ids = NDArray[np.int64]
+
+EFFORTS = {
+    "fast": CleanUp((16,), 0.2, 0.6),
+    "normal": CleanUp((16, 40, 80), 0.2, 0.6),
+    "best": CleanUp((16, 40, 80, 160), 0.4, 0.6),
+}
+GOOD_ENOUGH = 0.5  # scaled Jacobian down to which a face may get worse where that saves irregular nodes
+LAPLACE_SWEEPS, NEWTON_SWEEPS = 8, 6
+UNTANGLE_ROUNDS = 12  # while rings are bad
+
+
+@dataclass(frozen=True)
+class OptimizationOptions:
+    """How far a mesh is optimised.
+
+    Parameters
+    ----------
+    effort : {"fast", "normal", "best"}
+        How far irregular nodes are hunted.
+    threads : int
+        Number of threads; the mesh does not depend on it.
+    """
+
+    effort: str = "normal"
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        if self.effort not in EFFORTS:
+            raise InputError(f"effort is {self.effort!r}; give one of {', '.join(EFFORTS)}")
+        if self.threads < 1:
+            raise InputError(f"threads is {self.threads}; give at least 1")
+
+
+def optimize(mesh: QuadMesh, options: OptimizationOptions | None = None) -> QuadMesh:
+    """Lower the number of irregular nodes inside regions and raise the worst scaled Jacobian.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+        Any mesh of quads; some may be inverted.
+    options : OptimizationOptions, optional
+        Effort and threads.
+
+    Returns
+    -------
+    QuadMesh
+        With the same chains and regions. Boundary points stay where they are and come first, in their order. A region
+        gets new quads only where its worst scaled Jacobian does not fall, or stays above 0.5 while irregular nodes
+        become fewer.
+    """
+    options = options or OptimizationOptions()
+    old = _cut_at_chains(mesh)
+    how = EFFORTS[options.effort]
+    new = joined(in_batches(old, lambda part: _relaxed(clean_up(_relaxed(part), how)), options.threads))
+    better = _is_better(old, new, len(mesh.region_label))
+    return _stitch(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))
+
+
+def _cut_at_chains(mesh: QuadMesh) -> FaceQuads:
+    """Give each sector between two boundary lines a point of its own."""
+    sector = sectors_of(mesh)
+    node = np.empty(sector.max() + 1, np.int64)
+    node[sector] = mesh.quads
+    on_rim = np.zeros(mesh.n_points, bool)
+    on_rim[mesh.chain_points] = True
+    corners = np.radians(corner_angles(mesh.points, mesh.quads))
+    angle = np.asarray(np.bincount(sector.ravel(), weights=corners.ravel()), np.float64)
+    return FaceQuads(
+        mesh.points[node],
+        sector,
+        np.array(mesh.quad_region),
+        np.where(on_rim[node], node, -1),
+        np.where(on_rim[node], wanted_quads(angle), INNER_VALENCE),
+    )
+
+
+def _relaxed(part: FaceQuads) -> FaceQuads:
+    """Smooth the nodes inside faces."""
+    points, free = part.points.copy(), part.origin < 0
+    rings = rings_of(part.quads, len(points))
+    for _ in range(UNTANGLE_ROUNDS):
+        laplace(points, rings, free, LAPLACE_SWEEPS)
+        if untangle(points, rings, free, 2, BAD) == 0:
+            break
+    newton(points, rings, free, NEWTON_SWEEPS, GOOD)
+    return part._replace(points=points)
+
+
+def _is_better(old: FaceQuads, new: FaceQuads, n_faces: int) -> NDArray[np.bool_]:
+    """Tell of each face whether its new quads are better than its old ones."""
+    worst_old, worst_new = (worst_of_faces(m.points, m.quads, m.face, n_faces) for m in (old, new))
+    odd_old, odd_new = _irregular(old, n_faces), _irregular(new, n_faces)
+    fewer = (odd_new < odd_old) & (worst_new >= np.minimum(worst_old, GOOD_ENOUGH))
+    return np.asarray(fewer | ((odd_new <= odd_old) & (worst_new > worst_old)))
+
+
+def _irregular(mesh: FaceQuads, n_faces: int) -> Ids:
+    """Return how many points of each face have another number of quads than they should."""
+    offsets, corners = corners_at(mesh.quads, len(mesh.points))
+    odd = np.diff(offsets) != mesh.wanted
+    return np.bincount(mesh.face[corners[offsets[:-1][odd]] >> 2], minlength=n_faces)
+
+
+def _stitch(mesh: QuadMesh, quads: FaceQuads) -> QuadMesh:
+    """Join faces at the boundary's points, which come first."""
+    rim = np.unique(mesh.chain_points)
+    place = np.full(mesh.n_points, -1, np.int64)
+    place[rim] = np.arange(len(rim))
+    inner = quads.origin < 0
+    ids = place[quads.origin]
+    ids[inner] = len(rim) + np.arange(np.count_nonzero(inner))
+    return QuadMesh(
+        np.vstack([mesh.points[rim], quads.points[inner]]),
+        np.concatenate([mesh.point_kind[rim], np.full(np.count_nonzero(inner), PointKind.INTERIOR, np.uint8)]),
+        ids[quads.quads],
+        quads.face,
+        mesh.region_label,
+        mesh.chain_offsets,
+        place[mesh.chain_points],
+        mesh.chain_regions,
+        mesh.materials,
+    )

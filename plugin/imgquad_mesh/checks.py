@@ -1,0 +1,138 @@
+"""Parameters of filters, refused the way PyVista refuses them: its own validation, the limits of filters.xml."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from typing import Any
+
+import pyvista_validation
+
+from imgquad_mesh.spec import Parameter, filters
+
+_validation: Any = pyvista_validation  # its overloads are too many for type checkers
+UNITS = ("pixels", "world")
+
+
+def checked(**values: Any) -> dict[str, Any]:
+    """Return the values of parameters in plain Python types, by name.
+
+    Raises
+    ------
+    TypeError
+        A value has another type than it should.
+    ValueError
+        It is outside the limits or none of the choices. Limits that hang on the picture are the core's to check.
+    """
+    return {name: _value(name, value) for name, value in values.items()}
+
+
+def _value(name: str, value: Any) -> Any:
+    if name in _OWN:
+        return _OWN[name](value, name)
+    parameter = _parameters()[name]
+    if parameter.kind == "Enum":
+        return _choice(value, name, parameter.choices)
+    if parameter.kind == "Boolean":
+        return _flag(value, name)
+    return _number(value, name, parameter.kind == "Int", _limits(parameter))
+
+
+@cache
+def _parameters() -> Mapping[str, Parameter]:
+    return {p.field: p for p in filters()["generate_quad_mesh_from_image"].parameters}
+
+
+def _limits(parameter: Parameter) -> tuple[float, float] | None:
+    return None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
+
+
+def _number(value: Any, name: str, whole: bool = False, limits: tuple[float, float] | None = None) -> Any:
+    if value is None or isinstance(value, str):  # what NumPy says of these is not about the parameter
+        raise TypeError(f"{name} must be a number. Got {type(value)} instead.")
+    made = _validation.validate_number(
+        value, must_be_finite=True, must_be_real=True, must_be_integer=whole, must_be_in_range=limits, name=name
+    )
+    return int(made) if whole else float(made)
+
+
+def _length(value: Any, name: str) -> float:
+    return float(_number(value, name))
+
+
+def _length_or_none(value: Any, name: str) -> float | None:
+    return None if value is None else _length(value, name)
+
+
+def _flag(value: Any, name: str) -> bool:
+    _validation.check_instance(value, bool, name=name)
+    return bool(value)
+
+
+def _choice(value: Any, name: str, choices: Iterable[str]) -> str:
+    _validation.check_contains(list(choices), must_contain=value, name=name)
+    return str(value)
+
+
+def _limit_of_noise(value: Any, name: str) -> Any:
+    if isinstance(value, str):
+        return _choice(value, name, ["auto"])
+    made = _number(value, name, whole=name == "min_pixels")
+    _validation.check_nonnegative(made, name=name)
+    return made
+
+
+def _colors(value: Any, name: str) -> Any:
+    if isinstance(value, str):
+        return _choice(value, name, ("auto", "exact"))
+    if isinstance(value, Iterable):
+        palette = _validation.validate_array(
+            value, must_have_shape=(-1, 3), must_be_in_range=(0, 255), must_be_finite=True, name=name
+        )
+        return [tuple(map(int, color)) for color in palette]
+    return _number(value, name, whole=True, limits=(1, 256))
+
+
+def _sizes(value: Any, name: str) -> dict[str | int, float]:
+    if value is None:
+        return {}
+    _validation.check_instance(value, Mapping, name=name)
+    return {_material(key, name): _length(size, f"{name}[{key!r}]") for key, size in value.items()}
+
+
+def _materials(value: Any, name: str) -> tuple[str | int, ...]:
+    return tuple(_material(each, name) for each in _several(value, name))
+
+
+def _names(value: Any, name: str) -> tuple[str, ...]:
+    several = _several(value, name)
+    _validation.check_iterable_items(several, str, name=name)
+    return tuple(several)
+
+
+def _several(value: Any, name: str) -> list[Any]:
+    if isinstance(value, str):
+        return [value]
+    _validation.check_iterable(value, name=name)
+    return list(value)
+
+
+def _material(value: Any, name: str) -> str | int:
+    return value if isinstance(value, str) else int(_number(value, f"{name}: a material", whole=True))
+
+
+#: parameters that are no plain numbers, choices or flags in filters.xml, or not in it
+_OWN: Mapping[str, Callable[[Any, str], Any]] = {
+    "size": _length,
+    "inner_size": _length_or_none,
+    "boundary_size": _length_or_none,
+    "material_sizes": _sizes,
+    "colors": _colors,
+    "min_pixels": _limit_of_noise,
+    "min_length": _limit_of_noise,
+    "drop": _materials,
+    "materials": _materials,
+    "sample": _names,
+    "progress_bar": _flag,
+    "unit": lambda value, name: _choice(value, name, UNITS),
+}
