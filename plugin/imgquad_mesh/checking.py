@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from imgquad_core.errors import InputError, ScriptError
 
 from imgquad_mesh.catalogue import PRINTED_TYPES, MissingMeshLab, meshlab_filters, meshlab_parameters
-from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, ScriptValue
+from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, ScriptValue, script_text
 from imgquad_mesh.names import all_meshlab_names, meshlab_function, nearest
 from imgquad_mesh.spec import Filter, Parameter, filters, find_filter, python_name
 from imgquad_mesh.steps import STEPS, check_output, script_path
@@ -46,12 +46,36 @@ class OwnStep:
 
 @dataclass(frozen=True)
 class MeshLabStep:
-    """A filter of MeshLab, ready to run: parameters are (Python name, type in scripts, value)."""
+    """A filter of MeshLab, ready to run.
 
-    name: str
+    Parameters
+    ----------
+    source : ScriptFilter
+        As the script has it.
+    function : str
+        Python name.
+    parameters : tuple of (str, str, value)
+        Python name, type in scripts and value of each.
+    """
+
+    source: ScriptFilter
     function: str
     parameters: tuple[tuple[str, str, ScriptValue], ...]
-    line: int
+
+    @property
+    def name(self) -> str:
+        """Name in the script."""
+        return self.source.name
+
+    @property
+    def line(self) -> int:
+        """Line in the script."""
+        return self.source.line
+
+    @property
+    def script(self) -> str | None:
+        """A script of this filter alone; None where it has its Python name, which MeshLab's scripts do not know."""
+        return None if self.name == self.function else script_text(Script((self.source,)))
 
 
 def checked_steps(script: Script, folder: Path) -> list[OwnStep | MeshLabStep]:
@@ -157,7 +181,7 @@ def _meshlab_step(
                                       f"it must be {wanted}")  # fmt: skip
         values[name] = (name, given.kind, _file_checked(script, each, given, folder))
     # pymeshlab cannot set a camera (RichShotf); scripts hold none either
-    return MeshLabStep(each.name, function, tuple(v for v in values.values() if v[1] != "RichShotf"), each.line)
+    return MeshLabStep(each, function, tuple(v for v in values.values() if v[1] != "RichShotf"))
 
 
 def _file_checked(script: Script, each: ScriptFilter, given: ScriptParameter, folder: Path) -> ScriptValue:

@@ -116,17 +116,17 @@ def crosscheck(mesh: QuadMesh, deadline: float = 120.0) -> CrossCheck:
 def _with_meshlab(mesh: QuadMesh, deadline: float) -> Iterator[Comparison]:
     with tempfile.TemporaryDirectory(prefix="imgquad-") as folder, MeshLabProcess(Path(folder), deadline) as process:
         process.add(quad_layer(mesh))
-        yield from _topology(mesh, process.apply("get_topological_measures", []))
-        yield from _shape(mesh, process.apply("get_topological_measures_from_quad_mesh", []))
+        yield from _topology(mesh, process.apply("get_topological_measures"))
+        yield from _shape(mesh, process.apply("get_topological_measures_from_quad_mesh"))
         areas, perimeters = material_areas(mesh), material_perimeters(mesh)
         selected = {number: _selection(process, f"material == {number}") for number in areas}
         yield from _materials(mesh, areas, perimeters, selected)
-        yield from _sums(mesh, process.apply("get_geometric_measures", []), selected, _selection(process, "fi >= 0"))
+        yield from _sums(mesh, process.apply("get_geometric_measures"), selected, _selection(process, "fi >= 0"))
 
 
 def _selection(process: MeshLabProcess, condition: str) -> dict[str, Any]:
     process.apply("compute_selection_by_condition_per_face", [("condselect", "RichString", condition)])
-    return process.apply("get_area_and_perimeter_of_selection", [])
+    return process.apply("get_area_and_perimeter_of_selection")
 
 
 def _topology(mesh: QuadMesh, theirs: dict[str, Any]) -> Iterator[Comparison]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 import queue
+import re
 import subprocess
 import sys
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -50,7 +52,7 @@ class MeshLabProcess:
         meshlab_filters()  # a pymeshlab that is missing or half loaded is named before anything runs
         self.folder = folder
         self.deadline = deadline
-        self._errors = (folder / "stderr.txt").open("w+b")
+        self._errors = (folder / "stderr.txt").open("wb")
         root = str(Path(__file__).resolve().parents[1])
         paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
         self._process = subprocess.Popen(
@@ -115,8 +117,7 @@ class MeshLabProcess:
 
     def _exit_reason(self) -> str:
         code = self._process.wait()
-        self._errors.seek(0)
-        last = self._errors.read().decode(errors="replace").strip().splitlines()[-1:]
+        last = self._messages().strip().splitlines()[-1:]
         return ": ".join([f"signal {-code}" if code < 0 else f"exit code {code}", *(text[:200] for text in last)])
 
     def add(self, layer: Layer) -> int:
@@ -132,12 +133,31 @@ class MeshLabProcess:
         self._keep()
         return mesh
 
-    def apply(self, function: str, parameters: list[tuple[str, str, Any]]) -> dict[str, Any]:
-        """Apply a filter of MeshLab; `parameters` are (Python name, type in scripts, value). Return its dict."""
-        values: dict[str, Any] = self.ask("apply", function=function, parameters=parameters)
+    def apply(
+        self, function: str, parameters: Sequence[tuple[str, str, Any]] = (), script: str | None = None
+    ) -> dict[str, Any]:
+        """Apply a filter of MeshLab and return its dictionary.
+
+        Parameters
+        ----------
+        function : str
+            pymeshlab's name of the filter.
+        parameters : sequence of (str, str, value)
+            Python name, type in scripts and value of each.
+        script : str, optional
+            A script of this filter alone, with MeshLab's names: run where pymeshlab would clamp a value.
+        """
+        printed = self._messages()
+        answer = self.ask("apply", function=function, parameters=list(parameters), script=script)
+        ignored = re.search(r"parameter (\S+) not required", self._messages()[len(printed) :])
+        if answer.get("by_script") and ignored:
+            raise MeshLabError(f"MeshLab does not know the parameter {ignored[1]} by this name; write it as MeshLab does")
         if not function.startswith(_HARMLESS):
             self._keep()
-        return values
+        return dict(answer["values"])
+
+    def _messages(self) -> str:
+        return (self.folder / "stderr.txt").read_text(encoding="utf-8", errors="replace")
 
     def layer(self, mesh: int | None = None) -> Layer:
         """Return the current layer, or the one with this id."""

@@ -191,7 +191,7 @@ class _Runner:
             if isinstance(step, OwnStep):
                 program, values = "imgquad-mesh", STEPS[step.function].run(self.state, step.options)
             else:
-                program, values = "MeshLab", self._meshlab().apply(step.function, list(step.parameters))
+                program, values = "MeshLab", self._meshlab().apply(step.function, step.parameters, step.script)
         except (ImgquadError, OSError) as error:
             saved = self._save_last_good(target or file)
             kept = f"; the mesh before it is in {saved}" if saved else ""

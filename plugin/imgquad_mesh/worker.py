@@ -9,6 +9,7 @@ import itertools
 import json
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -90,12 +91,41 @@ def _open(pymeshlab: Any, meshes: Any, file: str) -> int:
     return int(meshes.current_mesh_id())
 
 
-def _apply(pymeshlab: Any, meshes: Any, function: str, parameters: list[list[Any]]) -> dict[str, Any]:
+def _apply(
+    pymeshlab: Any, meshes: Any, function: str, parameters: list[list[Any]], script: str | None = None
+) -> dict[str, Any]:
+    """Apply a filter.
+
+    pymeshlab clamps a bounded number to the limits that it has on the current mesh, where MeshLab's own scripts take it
+    as it is; then `script`, with this filter alone, is run in MeshLab's way.
+    """
     for name, kind, value in parameters:
         if kind == "RichMesh" and not meshes.mesh_id_exists(value):
             raise ValueError(f"parameter {name}: there is no mesh {value}; the set has {_ids(meshes)}")
     arguments = {name: typed(pymeshlab, kind, value) for name, kind, value in parameters}
-    return dict(meshes.apply_filter(function, **arguments) or {})
+    clamped = [name for name, kind, _ in parameters if kind == "RichDynamicFloat"]
+    if clamped:
+        used = meshes.filter_parameter_values(function, **arguments)
+        clamped = [name for name in clamped if np.float32(used[name]) != np.float32(arguments[name])]
+    if not clamped:
+        return {"values": dict(meshes.apply_filter(function, **arguments) or {})}
+    if script is None:
+        name = clamped[0]
+        raise ValueError(
+            f"parameter {name} is {arguments[name]:g}, which MeshLab would clamp to {used[name]:g} on this mesh; "
+            "give a value within its limits, or name filter and parameters as MeshLab's own scripts do"
+        )
+    _apply_as_script(meshes, script)
+    return {"values": {}, "by_script": True}
+
+
+def _apply_as_script(meshes: Any, script: str) -> None:
+    with tempfile.TemporaryDirectory(prefix="imgquad-") as folder:
+        path = Path(folder) / "one.mlx"
+        path.write_text(script, encoding="utf-8")
+        meshes.load_filter_script(str(path))
+    meshes.apply_filter_script()
+    meshes.clear_filter_script()
 
 
 def _ids(meshes: Any) -> str:

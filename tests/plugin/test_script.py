@@ -281,6 +281,12 @@ FAILING = {
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    """Let the kernels be compiled before times are taken."""
+    mesh_image(LABELS)
+
+
 def assert_refused(path: Path, message: str, seconds: float) -> None:
     """A ScriptError of this message, in time, and nothing written."""
     before, start = {p: p.read_bytes() for p in path.parent.iterdir()}, time.monotonic()
@@ -448,6 +454,23 @@ def test_forty_filters_run_with_their_defaults(scripts: Path, tmp_path: Path) ->
     assert result.values("get_topological_measures")["is_mesh_two_manifold"] in (True, False)
     assert result.current is not None
     assert result.current.n_faces > 100
+
+
+@needs_meshlab
+def test_value_that_pymeshlab_would_clamp_is_taken_as_meshlabs_scripts_take_it(tmp_path: Path) -> None:
+    def moved(filter_name: str, name: str, x: float) -> float:
+        value = f'name="{name}" type="RichDynamicFloat" value="{x}" min="-1e6" max="1e6"'
+        freeze = 'name="Freeze" type="RichBool" value="true"' if name == "axisX" else 'name="freeze" type="RichBool" value="true"'
+        result = run_script(script_file(tmp_path, MESH, filter_xml(filter_name, value, freeze)), image=LABELS)
+        assert result.current is not None
+        return float(result.current.points[:, 0].min())
+
+    assert moved("Transform: Translate, Center, set Origin", "axisX", 12345.5) == pytest.approx(12345.5)
+    assert moved("compute_matrix_from_translation", "axisx", 7.5) == pytest.approx(7.5)
+    with pytest.raises(ScriptError, match=r"12345\.5.*clamp"):
+        moved("compute_matrix_from_translation", "axisx", 12345.5)
+    with pytest.raises(ScriptError, match="does not know the parameter axisx by this name"):
+        moved("Transform: Translate, Center, set Origin", "axisx", 12345.5)
 
 
 # ---------------------------------------------------------------------------------------------------------- mixed scripts
