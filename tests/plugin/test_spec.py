@@ -22,7 +22,20 @@ ROOT = Path(__file__).resolve().parents[2]
 XML = (ROOT / "filters.xml").read_text(encoding="utf-8")
 
 #: first words of the names of pymeshlab's 281 filters
-VERBS = ("apply", "compute", "create", "delete", "export", "generate", "get", "load", "meshing", "save", "set", "transfer")
+VERBS = (
+    "apply",
+    "compute",
+    "create",
+    "delete",
+    "export",
+    "generate",
+    "get",
+    "load",
+    "meshing",
+    "save",
+    "set",
+    "transfer",
+)
 
 
 def is_valid(text: str) -> bool:
@@ -71,7 +84,7 @@ def test_names_are_in_meshlabs_grammar() -> None:
 
 def test_help_says_something() -> None:
     for spec in filters().values():
-        assert len(spec.help) > 60 or spec.function.startswith('export')
+        assert len(spec.help) > 60 or spec.function.startswith("export")
         assert spec.help.endswith(".")
         for p in spec.parameters:
             assert len(p.help) > 20, (spec.name, p.name)

@@ -14,7 +14,22 @@ if TYPE_CHECKING:
     from imgquad_mesh.script import ScriptResult
 
 #: endings of inputs that are meshes; all others are pictures
-MESHES = (".ply", ".obj", ".off", ".stl", ".vtu", ".vtk", ".3mf", ".gltf", ".glb", ".dae", ".x3d", ".wrl", ".dxf", ".ctm")
+MESHES = (
+    ".ply",
+    ".obj",
+    ".off",
+    ".stl",
+    ".vtu",
+    ".vtk",
+    ".3mf",
+    ".gltf",
+    ".glb",
+    ".dae",
+    ".x3d",
+    ".wrl",
+    ".dxf",
+    ".ctm",
+)
 
 
 def add_parser(subparsers: Any) -> None:
@@ -25,7 +40,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--input", type=Path, metavar="FILE", help=f"a mesh ({' '.join(MESHES)}) or else a picture")
     parser.add_argument("--output", type=Path, metavar="FILE", help="where the current mesh at the end is written")
     parser.add_argument("--folder", type=Path, help="files named in the script lie here (default: the script's folder)")
-    parser.add_argument("--deadline", type=number, default=120.0, metavar="S", help="seconds for a filter of MeshLab (120)")
+    parser.add_argument(
+        "--deadline", type=number, default=120.0, metavar="S", help="seconds for a filter of MeshLab (120)"
+    )
     parser.add_argument("--report", type=Path, metavar="FILE", help="what each filter returned: .json")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     parser.set_defaults(execute=execute)
