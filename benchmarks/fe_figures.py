@@ -1,0 +1,194 @@
+"""How good are solutions on our meshes? Prints the figures of docs/fe_figures.md; needs CalculiX and scikit-fem.
+
+python benchmarks/fe_figures.py patch ../shared/images     patch tests on the clean label pictures
+python benchmarks/fe_figures.py bounds                     effective modulus: bounds and order of convergence
+python benchmarks/fe_figures.py laminates                  against the exact answer
+python benchmarks/fe_figures.py inclusion [FIGURE.png]     Eshelby's circular inclusion, against the staircase mesh
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from ccx import solve
+from handmade import disk, staircase
+from imgquad_core.femesh import FEMesh
+from imgquad_core.model import QuadMesh
+from imgquad_core.pipeline import MeshOptions, mesh_image
+from imgquad_core.second_order import second_order
+from imgquad_core.sets import fe_mesh
+from imgquad_core.writers import write_mesh
+
+Floats = NDArray[np.float64]
+#: clean label pictures, and the size that keeps CalculiX within a minute each
+CLEAN = {
+    "composite_weave_labels_z75.png": 4.0,
+    "steel_duplex_ebsd_phase.png": 4.0,
+    "im2mesh_7phases.png": 5.0,
+    "rock_sandstone_labels_2a.png": 12.0,
+    "geology_hamersley_west.png": 16.0,
+}
+SAME = {"*": {"young": 210e3, "poisson": 0.3, "conductivity": 2.0}}
+
+
+def calculix(mesh: FEMesh, also: str = "", **options: object) -> dict[str, Floats]:
+    with tempfile.TemporaryDirectory() as folder:
+        write_mesh(mesh, Path(folder) / "a.inp", **options)
+        return solve(Path(folder) / "a.inp", also)
+
+
+def patch(folder: str) -> None:
+    print(f"{'picture':34s} {'size':>4s} {'quads':>7s} {'CPS4':>8s} {'CPE4':>8s} {'CPS8':>8s} {'heat':>8s} {'s':>5s}")
+    for name, size in CLEAN.items():
+        start = perf_counter()
+        mesh = fe_mesh(mesh_image(Path(folder) / name, MeshOptions(size=size)))
+        errors = [
+            stress_error(mesh, "plane stress", 210.0, 0.0),
+            stress_error(mesh, "plane strain", 210 / 0.91, 0.3 * 210 / 0.91),
+            stress_error(second_order(mesh), "plane stress", 210.0, 0.0),
+            heat_error(mesh),
+        ]
+        row = " ".join(f"{e:8.1e}" for e in errors)
+        print(f"{name:34s} {size:4.0f} {mesh.n_cells:7d} {row} {perf_counter() - start:5.0f}", flush=True)
+
+
+def stress_error(mesh: FEMesh, analysis: str, along: float, across: float) -> float:
+    """Largest deviation from the constant stress, over the stress."""
+    found = calculix(mesh, "*EL PRINT, ELSET=EALL\nS", analysis=analysis, properties=SAME, deck="tension")["stresses"]
+    return float(np.abs(found[:, 2:] - [along, 0, across, 0, 0, 0]).max() / along)
+
+
+def heat_error(mesh: FEMesh) -> float:
+    """Largest deviation from the linear temperature, which runs from 0 to 1."""
+    found = calculix(mesh, "*NODE PRINT, NSET=NALL\nNT", properties=SAME, deck="thermal")["temperatures"]
+    x = mesh.points[found[:, 0].astype(int) - 1, 0]
+    return float(np.abs(found[:, 1] - x / x.max()).max())
+
+
+def bounds() -> None:
+    labels = disk(160, 48)
+    soft, hard = 1.0, 10.0
+    share = labels.mean()
+    reuss, voigt = 1 / ((1 - share) / soft + share / hard), (1 - share) * soft + share * hard
+    print(f"disk of {share:.4f} in a plate, moduli {soft} and {hard}: Reuss {reuss:.5f}, Voigt {voigt:.5f}")
+    for order in (1, 2):
+        found = [effective_modulus(labels, size, order, soft, hard) for size in (16.0, 8.0, 4.0, 2.0)]
+        steps = np.diff(found)
+        rates = [np.log2(a / b) for a, b in pairwise(steps)]
+        print(f"order {order}: sizes 16 8 4 2:", " ".join(f"{e:.6f}" for e in found), "rates", np.round(rates, 2))
+        assert all(reuss < e < voigt for e in found)
+
+
+def effective_modulus(labels: NDArray[np.int32], size: float, order: int, soft: float, hard: float) -> float:
+    mesh = fe_mesh(mesh_image(labels, MeshOptions(size=size)))
+    mesh = second_order(mesh) if order == 2 else mesh
+    names = mesh.material_names()
+    values = {names[0]: {"young": soft, "poisson": 0.3}, names[1]: {"young": hard, "poisson": 0.3}}
+    force = calculix(mesh, properties=values, deck="tension")["total force"][0, 0]
+    return float(force / (1e-3 * labels.shape[0]))
+
+
+def laminates() -> None:
+    rows = np.repeat([0, 1, 2, 0, 1], [11, 23, 17, 29, 16])
+    conductivity = np.array([1.0, 7.0, 40.0])
+    for across in (False, True):
+        labels = np.repeat(rows[:, None], 96, axis=1)
+        labels = labels.T if across else labels
+        k = conductivity[rows]
+        exact = 1 / (1 / k).mean() if across else k.mean()
+        for size in (3.0, 8.0):
+            mesh = fe_mesh(mesh_image(labels, MeshOptions(size=size)))
+            values = {name: {"conductivity": conductivity[m]} for m, name in mesh.material_names().items()}
+            found = abs(calculix(mesh, properties=values, deck="thermal")["total heat generation"][0, 0])
+            print(f"layers {'across' if across else 'along'} x, size {size:g}: {found:.6f}, exact {exact:.6f}, "
+                  f"error {found / exact - 1:.1e}", flush=True)  # fmt: skip
+
+
+def inclusion(figure: str | None = None) -> None:
+    """A conducting disk in an infinite plate: inside, the flux is constant (Eshelby).
+
+    The plate is cut at a square border where the exact temperature is prescribed.
+    """
+    radius, n = 40.0, 321
+    labels = disk(n, radius)
+    print(
+        f"{'k':>5s} {'mesh':>9s} {'size':>5s} {'quads':>6s} {'mean':>9s} {'rms':>9s} {'largest':>9s}   flux error inside"
+    )
+    fields = {}
+    for k in (10.0, 0.1):
+        for size in (6, 3):
+            ours = mesh_image(labels, MeshOptions(size=float(size)))
+            coarse = staircase(disk(n // size, radius / size)).scaled(size)
+            for name, mesh, width in (("ours", ours, n), ("staircase", coarse, n // size * size)):
+                mean, rms, largest, field = flux_error(mesh, width / 2, radius, k)
+                fields[name, size, k] = (mesh, field)
+                print(
+                    f"{k:5g} {name:>9s} {size:5d} {mesh.n_quads:6d} {mean:9.5f} {rms:9.5f} {largest:9.5f}", flush=True
+                )
+    if figure:
+        draw(fields, figure)
+
+
+def flux_error(mesh: QuadMesh, middle: float, radius: float, k: float) -> tuple[float, float, float, Floats]:
+    """Error of the flux inside, over the exact one: of its mean, root mean square, largest of an element, each."""
+    import skfem
+    from skfem.models.poisson import laplace
+
+    grid = skfem.MeshQuad(mesh.points.T.copy(), mesh.quads.T.copy())
+    inside, outside = (np.flatnonzero(mesh.quad_material == m) for m in (1, 0))
+    element = skfem.ElementQuad1()
+    basis, basis_in = skfem.Basis(grid, element), skfem.Basis(grid, element, elements=inside)
+    matrix = laplace.assemble(skfem.Basis(grid, element, elements=outside)) + k * laplace.assemble(basis_in)
+    x, y = basis.doflocs - middle
+    r2 = np.maximum(x * x + y * y, radius**2)
+    exact = np.where(x * x + y * y < radius**2, 2 / (1 + k) * x, x * (1 + (1 - k) / (1 + k) * radius**2 / r2))
+    temperature = skfem.solve(*skfem.condense(matrix, x=exact, D=basis.get_dofs().all()))
+    flux = k * np.array(basis_in.interpolate(temperature).grad)
+    true = 2 * k / (1 + k)
+    error = np.hypot(flux[0] - true, flux[1]) / true
+    area = basis_in.dx
+    mean = np.hypot((flux[0] * area).sum() / area.sum() - true, (flux[1] * area).sum() / area.sum()) / true
+    cells = (flux * area).sum(axis=2) / area.sum(axis=1)
+    of_cell = np.hypot(cells[0] - true, cells[1]) / true
+    return float(mean), float(np.sqrt((error**2 * area).sum() / area.sum())), float(of_cell.max()), of_cell
+
+
+def draw(fields: dict, figure: str) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    from matplotlib.collections import PolyCollection
+
+    fig, axes = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
+    for axis, name in zip(axes, ("staircase", "ours"), strict=True):
+        mesh, field = fields[name, 3, 10.0]
+        inside = mesh.quad_material == 1
+        shown = PolyCollection(mesh.points[mesh.quads[inside]], array=100 * field, cmap="magma_r", clim=(0, 20), lw=0.2)
+        shown.set_edgecolor("grey")
+        axis.add_collection(shown)
+        axis.set_title(f"{name}: largest error {100 * field.max():.1f} %")
+        axis.set_aspect("equal")
+        axis.autoscale_view()
+        axis.set_axis_off()
+    fig.colorbar(shown, ax=axes, label="error of the heat flux inside the disk, %")
+    fig.savefig(figure, dpi=110)
+
+
+if __name__ == "__main__":
+    commands: dict[str, Callable[..., None]] = {
+        "patch": patch, "bounds": bounds, "laminates": laminates, "inclusion": inclusion
+    }  # fmt: skip
+    if len(sys.argv) < 2 or sys.argv[1] not in commands:
+        sys.exit(__doc__)
+    commands[sys.argv[1]](*sys.argv[2:])

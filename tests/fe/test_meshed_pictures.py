@@ -1,0 +1,64 @@
+"""Solutions on meshes of pictures: patch tests, exact laminates, bounds, Eshelby's inclusion."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ccx import needs_ccx
+from handmade import disk, staircase
+from imgquad_core.pipeline import MeshOptions, mesh_image
+from imgquad_core.second_order import second_order
+from imgquad_core.sets import fe_mesh
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+import fe_figures
+
+pytest.importorskip("skfem")
+
+
+@needs_ccx
+@pytest.mark.parametrize("name", ["steel_duplex_ebsd_phase.png", "composite_weave_labels_z75.png"])
+def test_patch_tests_on_real_pictures(images: Path, name: str) -> None:
+    mesh = fe_mesh(mesh_image(images / name, MeshOptions(size=5.0)))
+    assert fe_figures.stress_error(mesh, "plane stress", 210.0, 0.0) < 1e-6
+    assert fe_figures.stress_error(mesh, "plane strain", 210 / 0.91, 0.3 * 210 / 0.91) < 1e-6
+    assert fe_figures.stress_error(second_order(mesh), "plane stress", 210.0, 0.0) < 1e-6
+    assert fe_figures.heat_error(mesh) < 1e-6
+
+
+@needs_ccx
+def test_the_effective_modulus_lies_between_the_bounds_and_converges() -> None:
+    labels = disk(96, 30)
+    share = labels.mean()
+    found = [fe_figures.effective_modulus(labels, size, 1, 1.0, 10.0) for size in (8.0, 4.0, 2.0)]
+    assert all(1 / (1 - share + share / 10) < e < 1 - share + 10 * share for e in found)
+    assert abs(found[2] - found[1]) < 0.6 * abs(found[1] - found[0])
+
+
+@needs_ccx
+@pytest.mark.parametrize("across", [False, True])
+def test_meshed_laminates_are_exact(across: bool) -> None:
+    rows = np.repeat([0, 1, 0], [9, 13, 10])
+    labels = np.repeat(rows[:, None], 40, axis=1)
+    k = np.array([1.0, 9.0])[rows]
+    mesh = fe_mesh(mesh_image(labels.T if across else labels, MeshOptions(size=5.0)))
+    values = {name: {"conductivity": (1.0, 9.0)[m]} for m, name in mesh.material_names().items()}
+    found = abs(fe_figures.calculix(mesh, properties=values, deck="thermal")["total heat generation"][0, 0])
+    width, height = labels.T.shape[::-1] if across else labels.shape[::-1]
+    exact = (1 / (1 / k).mean() if across else k.mean()) * height / width
+    assert found == pytest.approx(exact, rel=1e-3)
+
+
+def test_the_flux_in_a_round_inclusion_is_eshelbys() -> None:
+    radius, n = 40.0, 201
+    mean, rms, _, _ = fe_figures.flux_error(mesh_image(disk(n, radius), MeshOptions(size=3.0)), n / 2, radius, 10.0)
+    coarse = staircase(disk(n // 3, radius / 3)).scaled(3)
+    stairs_mean, stairs_rms, _, _ = fe_figures.flux_error(coarse, n // 3 * 1.5, radius, 10.0)
+    assert mean < 0.01
+    assert rms < 0.01
+    assert stairs_mean > 5 * mean
+    assert stairs_rms > 5 * rms
