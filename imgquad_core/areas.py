@@ -71,11 +71,11 @@ def restore_areas(
     normal = _normals(points, chain_points, offsets, bound)
     moved = _moved(points, chain_points, offsets, bound, normal, shift)
     for _ in range(_STEPS):
-        swept, weight = _sweep(moved, chain_points, offsets, bound, normal, shift)
+        swept, growth = _sweep(moved, chain_points, offsets, bound, normal, shift)
         missing = target - _areas(swept, sides, len(target))
         if np.all(np.abs(missing) <= _GOOD * target):
             break
-        shift = np.clip(shift + _shifts(weight, sides, missing, target), -bound.max(), bound.max())
+        shift = np.clip(shift + _shifts(np.maximum(growth, 0.0), sides, missing, target), -bound.max(), bound.max())
         moved = _moved(points, chain_points, offsets, bound, normal, shift)
     return moved, shift
 
@@ -115,13 +115,11 @@ def _sweep(
                 a, b = _beside(chain_points, offsets, c, k)
                 x, y = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
                 growth[c] += 0.5 * (normal[k, 1] * x - normal[k, 0] * y)
-    return swept, np.maximum(growth, 0.0)
+    return swept, growth
 
 
 @kernel
-def _moved(
-    points: Floats, chain_points: Ints, offsets: Ints, bound: Floats, normal: Floats, shift: Floats
-) -> Floats:
+def _moved(points: Floats, chain_points: Ints, offsets: Ints, bound: Floats, normal: Floats, shift: Floats) -> Floats:
     moved = points.copy()
     for c in range(len(shift)):
         for k in range(offsets[c], offsets[c + 1] - 1):

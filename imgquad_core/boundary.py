@@ -117,7 +117,7 @@ def _count_sides(code: NDArray[np.uint8]) -> int:
 def _graph(
     chains: _Chains, region_label: NDArray[np.int32], region_pixels: NDArray[np.int64], shape: tuple[int, int]
 ) -> BoundaryGraph:
-    """Number the points: chain ends first, in the order of their corners, then the others chain by chain."""
+    """Put the points into a graph: chain ends first, in the order of their corners, then the others chain by chain."""
     places, offsets, ends, sides = chains
     closed = ends[:, 0] < 0
     nodes, at = np.unique(ends[~closed], return_inverse=True)
@@ -168,7 +168,7 @@ def _classify_corners(padded: NDArray[np.int32], policy: int) -> NDArray[np.uint
 
 @kernel
 def _resolve(padded: NDArray[np.int32], i: int, j: int, policy: int) -> int:
-    """What the chains do where all four sides have two colours."""
+    """Choose what the chains do where all four sides have two colours."""
     a, b = padded[i, j], padded[i, j + 1]
     main, other = a == padded[i + 1, j + 1], b == padded[i + 1, j]
     if policy == _JUNCTION or not (main or other):
@@ -178,9 +178,9 @@ def _resolve(padded: NDArray[np.int32], i: int, j: int, policy: int) -> int:
     n_a = n_b = 0
     if policy != _LOWER:
         for k in range(max(i - 2, 0), min(i + 4, padded.shape[0])):
-            for l in range(max(j - 2, 0), min(j + 4, padded.shape[1])):
-                n_a += padded[k, l] == a
-                n_b += padded[k, l] == b
+            for m in range(max(j - 2, 0), min(j + 4, padded.shape[1])):
+                n_a += padded[k, m] == a
+                n_b += padded[k, m] == b
     if n_a == n_b:
         return _JOINS_AD if a < b else _JOINS_BC
     return _JOINS_AD if (n_a < n_b) == (policy == _MINORITY) else _JOINS_BC
@@ -253,12 +253,12 @@ def _region_at(
             low = middle
         else:
             high = middle
-    return region[low]
+    return int(region[low])
 
 
 @kernel
 def _leave(code: int, came_from: int) -> int:
-    """The side by which a chain that came by side `came_from` (0 up, 1 right, 2 down, 3 left) leaves a corner."""
+    """Give the side (0 up, 1 right, 2 down, 3 left) by which a chain leaves a corner, from the one it came by."""
     what = code & _WHAT
     if what == _JOINS_AD:  # up with right, down with left
         return came_from ^ 1
@@ -270,13 +270,13 @@ def _leave(code: int, came_from: int) -> int:
 
 @kernel
 def _see(code: NDArray[np.uint8], i: int, j: int, side: int) -> bool:
-    """Mark a side as traced; was it before?"""
+    """Mark a side as traced, and tell whether it was before."""
     if side == 0:
         i -= 1
     elif side == 3:
         j -= 1
     bit = np.uint8(_SEEN_DOWN if side % 2 == 0 else _SEEN_RIGHT)
-    seen = code[i, j] & bit != 0
+    seen = bool(code[i, j] & bit != 0)
     code[i, j] |= bit
     return seen
 
@@ -304,7 +304,7 @@ def _follow(code: NDArray[np.uint8], i: int, j: int, side: int, places: NDArray[
 @kernel
 def _is_seen(code: NDArray[np.uint8], i: int, j: int, side: int) -> bool:
     bit = _SEEN_DOWN if side % 2 == 0 else _SEEN_RIGHT
-    return code[i - (side == 0), j - (side == 3)] & bit != 0
+    return bool(code[i - (side == 0), j - (side == 3)] & bit != 0)
 
 
 @kernel
@@ -345,6 +345,4 @@ def _trace_chains(
                         sides[count, 0], sides[count, 1] = left, right
                         count += 1
     n_places = offsets[count]
-    return _Chains(
-        places[:n_places].copy(), offsets[: count + 1].copy(), ends[:count].copy(), sides[:count].copy()
-    )
+    return _Chains(places[:n_places].copy(), offsets[: count + 1].copy(), ends[:count].copy(), sides[:count].copy())

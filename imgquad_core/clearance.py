@@ -20,10 +20,12 @@ _ROOM = 0.25  # least distance of a node from a segment that is not its own, ove
 
 def snapped(points: Floats) -> Floats:
     """Round coordinates to the grid on which the test is exact."""
-    return np.round(points * UNITS) / UNITS
+    return np.asarray(np.round(points * UNITS) / UNITS)
 
 
-def find_conflicts(points: Floats, segments: Ints, chain: Ints, is_new: Flags, shape: tuple[int, int]) -> NDArray[np.uint8]:
+def find_conflicts(
+    points: Floats, segments: Ints, chain: Ints, is_new: Flags, shape: tuple[int, int]
+) -> NDArray[np.uint8]:
     """Find segments that cross, touch, coincide, have no length or come too close.
 
     Parameters
@@ -124,7 +126,7 @@ def _raise(marks: NDArray[np.uint8], k: int, mark: int) -> None:
 
 @kernel
 def _any_new(chain: Ints, is_new: Flags, items: Ints, low: int, high: int) -> bool:
-    for i in range(low, high):
+    for i in range(low, high):  # noqa: SIM110 - kernels know no generators
         if is_new[chain[items[i]]]:
             return True
     return False
@@ -133,7 +135,7 @@ def _any_new(chain: Ints, is_new: Flags, items: Ints, low: int, high: int) -> bo
 @kernel
 def _compare(grid: Ints, points: Floats, a: int, b: int, c: int, d: int) -> int:
     """FREE, CLOSE or CROSSING for the segments a b and c d."""
-    if a == c or a == d or b == c or b == d:
+    if a in (c, d) or b in (c, d):
         if (a == c and b == d) or (a == d and b == c):
             return CROSSING
         if a == d or b == d:
@@ -172,7 +174,7 @@ def _boxes_meet(grid: Ints, a: int, b: int, c: int, d: int) -> bool:
 
 @kernel
 def _is_close(points: Floats, a: int, b: int, c: int, d: int) -> bool:
-    """Is c or d nearer to the segment a b than a quarter of its length?"""
+    """Tell whether c or d is nearer to the segment a b than a quarter of its length."""
     dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     length2 = dx * dx + dy * dy
     for k in range(2):
@@ -230,4 +232,4 @@ def _sector(points: Floats, v: int, p: int, q: int) -> float:
     """Angle between the segments from v to p and to q."""
     ux, uy = points[p, 0] - points[v, 0], points[p, 1] - points[v, 1]
     wx, wy = points[q, 0] - points[v, 0], points[q, 1] - points[v, 1]
-    return abs(np.arctan2(ux * wy - uy * wx, ux * wx + uy * wy))
+    return float(abs(np.arctan2(ux * wy - uy * wx, ux * wx + uy * wy)))

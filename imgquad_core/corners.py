@@ -86,8 +86,9 @@ def _find(curves: Curves) -> Flags:
 @kernel
 def _corner_at(curves: Curves, c: int, i: int, far: float) -> tuple[float, float, float]:
     """How straight the sides of point i are (0: no corner), and the shift to where their lines meet."""
-    n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -1, _NEAR, far)
-    m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, 1, _NEAR, far)
+    step = curves.ends.shape[1] - 1  # 1, but not a literal: those are compiled for on their own
+    n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, far)
+    m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, far)
     turn = np.pi - abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
     if n < 6 or m < 6 or max(rms_u, rms_v) > _STRAIGHT or turn < _TURN:
         return 0.0, 0.0, 0.0

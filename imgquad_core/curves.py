@@ -1,4 +1,4 @@
-"""The dense curves that smoothing works on: every chain with its own copy of all its points, and the ends they share."""
+"""The dense curves that smoothing works on: every chain with its own copy of its points, and the ends they share."""
 
 from __future__ import annotations
 
@@ -30,13 +30,18 @@ class Curves(NamedTuple):
     offsets: Ints  #: (n_chains + 1,)
     ends: Ints  #: (n_chains, 2) node at either end; -1 closed
     is_frame: Flags  #: (n_chains,) lies on the picture's border
-    node: Floats  #: (n_nodes, 2) place of each node in `raw`
-    node_kind: NDArray[np.uint8]  #: (n_nodes,) JUNCTION or CORNER
-    node_offsets: Ints  #: (n_nodes + 1,) CSR of `sockets`
+
+
+class Ends(NamedTuple):
+    """The points that chains end at."""
+
+    place: Floats  #: (n_nodes, 2)
+    kind: NDArray[np.uint8]  #: (n_nodes,) JUNCTION or CORNER
+    offsets: Ints  #: (n_nodes + 1,) CSR of `sockets`
     sockets: Ints  #: 2 * chain + 0 for its start or 1 for its end
 
 
-def curves_of(graph: BoundaryGraph) -> Curves:
+def curves_of(graph: BoundaryGraph) -> tuple[Curves, Ends]:
     """Unpack a pixel boundary."""
     raw = graph.points[graph.chain_points]
     first, last = graph.chain_points[graph.chain_offsets[:-1]], graph.chain_points[graph.chain_offsets[1:] - 1]
@@ -48,13 +53,15 @@ def curves_of(graph: BoundaryGraph) -> Curves:
     sockets = np.flatnonzero(ends.ravel() >= 0)
     at = ends.ravel()[sockets]
     second = graph.chain_points[graph.chain_offsets[:-1] + 1]
-    return Curves(
+    curves = Curves(
         raw,
         arc_lengths(raw, np.array(graph.chain_offsets)),
         sample_weights(raw, np.array(graph.chain_offsets)),
         np.array(graph.chain_offsets),
         ends,
         graph.point_kind[second] == PointKind.FRAME,
+    )
+    return curves, Ends(
         graph.points[nodes],
         graph.point_kind[nodes],
         np.concatenate([[0], np.cumsum(np.bincount(at, minlength=len(nodes)))]).astype(np.int64),

@@ -13,7 +13,9 @@ import numpy as np
 from imgquad_core.curves import Curves, Floats, Ints
 from imgquad_core.jit import kernel
 
-_REACH = 4.0  # px searched at the finest level; each level has every 4th point of the one before, and four times the reach
+_REACH = (
+    4.0  # px searched at the finest level; each level has every 4th point of the one before, and four times the reach
+)
 
 
 def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float) -> Floats:
@@ -99,7 +101,7 @@ def _arc_between(curves: Curves, c: int, i: int, d: int, j: int) -> float:
     if c == d:
         shortest = abs(curves.arc[i] - curves.arc[j])
         if curves.ends[c, 0] < 0:
-            return min(shortest, curves.arc[curves.offsets[c + 1] - 1] - shortest)
+            return float(min(shortest, curves.arc[curves.offsets[c + 1] - 1] - shortest))
     elif curves.ends[c, 0] < 0 or curves.ends[d, 0] < 0:
         return shortest
     for side in range(2):

@@ -15,7 +15,7 @@ from imgquad_core.curves import Floats, Ints
 from imgquad_core.jit import kernel
 
 WINDOWS = (3.0, 4.5, 6.5, 9.5, 14.0, 20.0, 30.0, 45.0, 65.0)  #: half widths that are tried, px of arc
-STAIR_NOISE = 0.33  #: px; steps of a digital straight line have a standard deviation of 1 / sqrt(12) = 0.289, in short windows more
+STAIR_NOISE = 0.33  #: px; steps of a digital straight line have a deviation of 1 / sqrt(12) = 0.289, some more
 _EVERY = 4  # windows are chosen at every 4th point
 _DARING = 20.0  # wider ones only if the last two did
 _SLOPE = 0.5  # and change by this much a px of arc
@@ -26,8 +26,8 @@ _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are: regressio
 def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats) -> float:
     """Weighted sums within +-w of point i, with u = s - s[i] and x, y relative to it.
 
-    sums[0:5] of u^0..u^4, [5:8] of x, u x, u^2 x, [8:11] of y, u y, u^2 y, [11:14] of x x, x y, y y. Gives the sum of the bell
-    alone, over the samples that count.
+    sums[0:5] of u^0..u^4, [5:8] of x, u x, u^2 x, [8:11] of y, u y, u^2 y, [11:14] of x x, x y, y y.
+    Gives the sum of the bell alone, over the samples that count.
     """
     for k in range(14):
         sums[k] = 0.0
@@ -78,7 +78,9 @@ def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, fl
 
 
 @kernel
-def quadratic_at(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats) -> tuple[float, float, float]:
+def quadratic_at(
+    x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats
+) -> tuple[float, float, float]:
     """Fit around point i: its shift in x and in y, and the root mean square residual across the curve."""
     count = _sum_up(x, y, s, q, i, w, sums)
     x0, x1, x2 = _solve(sums, sums[5], sums[6], sums[7])
@@ -120,8 +122,10 @@ def _choose_windows(
 
 
 @kernel
-def _extend(points: Floats, arc: Floats, weight: Floats, first: int, last: int, closed: bool, reach: float, out: Floats) -> int:
-    """Copy a piece into out (rows x, y, s, weight), continued by `reach` at both ends; gives the place of its first point.
+def _extend(
+    points: Floats, arc: Floats, weight: Floats, first: int, last: int, closed: bool, reach: float, out: Floats
+) -> int:
+    """Copy a piece into out (rows x, y, s, weight), `reach` more at both ends; give the place of its first point.
 
     A closed chain goes on round, an open piece by its own image turned about its end: the curve keeps its ends.
     """

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imgquad_core.curves import Curves, Floats, line_beside
+from imgquad_core.curves import Curves, Ends, Floats, line_beside
 from imgquad_core.jit import kernel
 from imgquad_core.model import PointKind
 
@@ -16,18 +16,22 @@ _NEAR, _FAR = 1.2, 8.0  # px of arc of a chain that its line is fitted to
 _PULL = 0.15  # weight of the old place against that of one line
 _FARTHEST = 0.5  # px that a node moves at most
 _ROOM = 0.35  # of the local feature size and of the shortest chain at the node, so that no two nodes can meet
-_BORDER_WINDOWS = np.array([96.0, 68.0, 48.0, 36.0, 27.0, 20.0, 15.0, 11.0])  # px of arc that say where a chain meets the border
+_BORDER_WINDOWS = np.array(
+    [96.0, 68.0, 48.0, 36.0, 27.0, 20.0, 15.0, 11.0]
+)  # px of arc that say where a chain meets the border
 _BORDER_NOISE = 0.31  # px of residual up to which they are believed
 _JUNCTION = int(PointKind.JUNCTION)
 
 
-def place_junctions(curves: Curves, room: Floats, shape: tuple[int, int]) -> Floats:
+def place_junctions(curves: Curves, nodes: Ends, room: Floats, shape: tuple[int, int]) -> Floats:
     """Find better places for the junctions.
 
     Parameters
     ----------
     curves : Curves
         The pixel boundary.
+    nodes : Ends
+        The ends of its chains.
     room : float64, shape (n,)
         How far each dense point may move.
     shape : tuple of int
@@ -38,22 +42,22 @@ def place_junctions(curves: Curves, room: Floats, shape: tuple[int, int]) -> Flo
     float64, shape (n_nodes, 2)
         New place of each node; those on the border moved along it, the picture's corners not at all.
     """
-    return _place(curves, room, float(shape[1]), float(shape[0]), _BORDER_WINDOWS)
+    return _place(curves, nodes, room, float(shape[1]), float(shape[0]), _BORDER_WINDOWS)
 
 
 @kernel
-def _place(curves: Curves, room: Floats, width: float, height: float, windows: Floats) -> Floats:
-    placed = curves.node.copy()
+def _place(curves: Curves, nodes: Ends, room: Floats, width: float, height: float, windows: Floats) -> Floats:
+    placed = nodes.place.copy()
     for v in range(len(placed)):
-        if curves.node_kind[v] != _JUNCTION:
+        if nodes.kind[v] != _JUNCTION:
             continue
-        x, y = curves.node[v, 0], curves.node[v, 1]
+        x, y = nodes.place[v, 0], nodes.place[v, 1]
         on_side, on_end = x == 0 or x == width, y == 0 or y == height
         if on_side or on_end:
-            dx, dy = _slide(curves, v, 0 if on_end else 1, windows)
+            dx, dy = _slide(curves, nodes, v, 0 if on_end else 1, windows)
         else:
-            dx, dy = _meet(curves, v)
-        limit = _limit(curves, room, v)
+            dx, dy = _meet(curves, nodes, v)
+        limit = _limit(curves, nodes, room, v)
         size = np.hypot(dx, dy)
         if size > limit:
             dx, dy = dx * limit / size, dy * limit / size
@@ -62,10 +66,10 @@ def _place(curves: Curves, room: Floats, width: float, height: float, windows: F
 
 
 @kernel
-def _limit(curves: Curves, room: Floats, v: int) -> float:
+def _limit(curves: Curves, nodes: Ends, room: Floats, v: int) -> float:
     limit = _FARTHEST
-    for k in range(curves.node_offsets[v], curves.node_offsets[v + 1]):
-        socket = curves.sockets[k]
+    for k in range(nodes.offsets[v], nodes.offsets[v + 1]):
+        socket = nodes.sockets[k]
         c = socket // 2
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
         limit = min(limit, _ROOM * curves.arc[last], room[last if socket % 2 else first])
@@ -75,15 +79,15 @@ def _limit(curves: Curves, room: Floats, v: int) -> float:
 @kernel
 def _end(curves: Curves, socket: int) -> int:
     """Dense point of a chain at one of its ends."""
-    return curves.offsets[socket // 2 + 1] - 1 if socket % 2 else curves.offsets[socket // 2]
+    return int(curves.offsets[socket // 2 + 1] - 1 if socket % 2 else curves.offsets[socket // 2])
 
 
 @kernel
-def _meet(curves: Curves, v: int) -> tuple[float, float]:
+def _meet(curves: Curves, nodes: Ends, v: int) -> tuple[float, float]:
     """Shift of a node to the point nearest to the lines of its chains."""
     a, b, d, p, q = _PULL, 0.0, _PULL, 0.0, 0.0
-    for k in range(curves.node_offsets[v], curves.node_offsets[v + 1]):
-        socket = curves.sockets[k]
+    for k in range(nodes.offsets[v], nodes.offsets[v + 1]):
+        socket = nodes.sockets[k]
         n, x, y, tx, ty, _ = line_beside(curves, socket // 2, _end(curves, socket), 1 - 2 * (socket % 2), _NEAR, _FAR)
         if n < 3:
             continue
@@ -95,11 +99,11 @@ def _meet(curves: Curves, v: int) -> tuple[float, float]:
 
 
 @kernel
-def _slide(curves: Curves, v: int, axis: int, windows: Floats) -> tuple[float, float]:
+def _slide(curves: Curves, nodes: Ends, v: int, axis: int, windows: Floats) -> tuple[float, float]:
     """Shift of a node along the border, to where the lines of its inner chains meet it."""
     total, count = 0.0, 0
-    for k in range(curves.node_offsets[v], curves.node_offsets[v + 1]):
-        socket = curves.sockets[k]
+    for k in range(nodes.offsets[v], nodes.offsets[v + 1]):
+        socket = nodes.sockets[k]
         if curves.is_frame[socket // 2]:
             continue
         for far in windows:

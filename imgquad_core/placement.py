@@ -93,7 +93,7 @@ def place_nodes(
 
 @kernel
 def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, least: int) -> int:
-    """Number of coarse segments of a piece."""
+    """Choose the number of coarse segments of a piece."""
     total = 0.5 * (cost[end] - cost[begin])
     length = curves.arc[end] - curves.arc[begin]
     if total > _LONG and length > 2 * _COARSE * total * limit[begin]:

@@ -8,8 +8,9 @@ picture) and along the chain (where neighbouring edges keep within `edge_ratio`)
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from imgquad_core.curves import Curves, Floats, Ints
+from imgquad_core.curves import Curves, Flags, Floats, Ints
 from imgquad_core.features import local_feature_size
 from imgquad_core.jit import kernel
 
@@ -22,7 +23,12 @@ _OVER = 2.0  # px of arc to each side over which the bend is measured
 
 
 def edge_sizes(
-    points: Floats, curves: Curves, limit: Floats, is_corner: Floats, growth: float, edge_ratio: float,
+    points: Floats,
+    curves: Curves,
+    limit: Floats,
+    is_corner: Flags,
+    growth: float,
+    edge_ratio: float,
     shape: tuple[int, int],
 ) -> Floats:
     """Wanted length of final edges at each dense point.
@@ -67,7 +73,7 @@ def grade(
 
 
 @kernel
-def _limit_turn(points: Floats, offsets: Floats, arc: Floats, corners: Ints, size: Floats) -> None:
+def _limit_turn(points: Floats, offsets: Ints, arc: Floats, corners: Ints, size: Floats) -> None:
     """`corners` counts the corners up to each point."""
     for c in range(len(offsets) - 1):
         first, last = offsets[c], offsets[c + 1] - 1
@@ -87,47 +93,39 @@ def _limit_turn(points: Floats, offsets: Floats, arc: Floats, corners: Ints, siz
                 size[i] = max(_TURN * apart / turn, min(size[i], _FINEST_BEND))
 
 
-@kernel
-def _grade_plane(size: Floats, points: Floats, slope: float, raster: Floats) -> Floats:
+def _grade_plane(size: Floats, points: Floats, slope: float, raster: NDArray[np.float32]) -> Floats:
     """Two chamfer passes over the pixels, then back to the points."""
-    n_rows, n_cols = raster.shape
-    for i in range(len(size)):
-        r, c = min(int(points[i, 1]), n_rows - 1), min(int(points[i, 0]), n_cols - 1)
-        raster[r, c] = min(raster[r, c], np.float32(size[i]))
-    straight, slanting = np.float32(slope), np.float32(slope * np.sqrt(2.0))
-    for r in range(n_rows):
-        for c in range(n_cols):
-            best = raster[r, c]
-            if c > 0:
-                best = min(best, raster[r, c - 1] + straight)
-            if r > 0:
-                best = min(best, raster[r - 1, c] + straight)
-                if c > 0:
-                    best = min(best, raster[r - 1, c - 1] + slanting)
-                if c < n_cols - 1:
-                    best = min(best, raster[r - 1, c + 1] + slanting)
-            raster[r, c] = best
-    for r in range(n_rows - 1, -1, -1):
-        for c in range(n_cols - 1, -1, -1):
-            best = raster[r, c]
-            if c < n_cols - 1:
-                best = min(best, raster[r, c + 1] + straight)
-            if r < n_rows - 1:
-                best = min(best, raster[r + 1, c] + straight)
-                if c > 0:
-                    best = min(best, raster[r + 1, c - 1] + slanting)
-                if c < n_cols - 1:
-                    best = min(best, raster[r + 1, c + 1] + slanting)
-            raster[r, c] = best
-    graded = size.copy()
-    for i in range(len(size)):
-        r, c = min(int(points[i, 1]), n_rows - 1), min(int(points[i, 0]), n_cols - 1)
-        graded[i] = min(size[i], raster[r, c])
-    return graded
+    row = np.minimum(points[:, 1].astype(np.int64), raster.shape[0] - 1)
+    column = np.minimum(points[:, 0].astype(np.int64), raster.shape[1] - 1)
+    np.minimum.at(raster, (row, column), size.astype(np.float32))
+    for forward in (True, False):
+        _chamfer(raster, np.float32(slope), np.float32(slope * np.sqrt(2.0)), forward)
+    return np.minimum(size, raster[row, column])
 
 
 @kernel
-def _grade_chains(size: Floats, arc: Floats, offsets: Floats, ends: Floats, slope: float) -> Floats:
+def _chamfer(raster: NDArray[np.float32], straight: np.float32, slanting: np.float32, forward: bool) -> None:
+    """Carry sizes to the pixels below and to the right, or above and to the left."""
+    n_rows, n_cols = raster.shape
+    step = 1 if forward else -1
+    for i in range(n_rows):
+        r = i if forward else n_rows - 1 - i
+        for j in range(n_cols):
+            c = j if forward else n_cols - 1 - j
+            best = raster[r, c]
+            if j > 0:
+                best = min(best, raster[r, c - step] + straight)
+            if i > 0:
+                best = min(best, raster[r - step, c] + straight)
+                if c > 0:
+                    best = min(best, raster[r - step, c - 1] + slanting)
+                if c < n_cols - 1:
+                    best = min(best, raster[r - step, c + 1] + slanting)
+            raster[r, c] = best
+
+
+@kernel
+def _grade_chains(size: Floats, arc: Floats, offsets: Ints, ends: Ints, slope: float) -> Floats:
     size = size.copy()
     for c in range(len(offsets) - 1):
         first, last = offsets[c], offsets[c + 1] - 1

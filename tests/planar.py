@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import shapely
-from imgquad_core.model import BoundaryGraph, PointKind
 from numpy.typing import NDArray
+
+from imgquad_core.model import BoundaryGraph, PointKind
 
 
 def level_chains(graph: BoundaryGraph, step: int) -> list[NDArray[np.int64]]:
@@ -46,7 +48,7 @@ def check_faces(graph: BoundaryGraph, chains: list[NDArray[np.int64]]) -> None:
         regions = set()
         for ring in (face.exterior, *face.interiors):
             ids = [at[xy] for xy in ring.coords]
-            regions |= {int(side[pair]) for pair in zip(ids[:-1], ids[1:], strict=True)}
+            regions |= {int(side[pair]) for pair in pairwise(ids)}
         assert len(regions) == 1, f"a face with the regions {regions}"
         found[regions.pop()] += 1
     assert all(found[r] == 1 for r in range(len(graph.region_label))), "a region with no face or several"

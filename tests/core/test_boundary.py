@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from planar import check_planar
 from scipy import ndimage
-from shapes import any_labels, label_image, spiral
 
 from imgquad_core.boundary import POLICIES, ExtractionOptions, extract_boundaries
 from imgquad_core.errors import InputError
 from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.smoothing import region_areas
+from planar import check_planar
+from shapes import any_labels, label_image, spiral
 
 EIGHT = np.ones((3, 3))
 

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from planar import check_meshable, check_planar
-from shapes import any_labels, disc, half_plane, label_image, spiral, square, voronoi
 
 from imgquad_core.boundary import POLICIES, ExtractionOptions, extract_boundaries
 from imgquad_core.errors import InputError
 from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.smoothing import SmoothingOptions, region_areas, smooth_boundaries
+from planar import check_meshable, check_planar
+from shapes import any_labels, disc, half_plane, label_image, spiral, square, voronoi
 
 SIZES = (1.0, 2.5, 6.0)
 
