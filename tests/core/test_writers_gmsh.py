@@ -12,7 +12,10 @@ import numpy as np
 import pytest
 
 from handmade import disk, jiggle_beside, staircase
+from imgquad_core.cohesive import split_interfaces
 from imgquad_core.errors import InputError
+from imgquad_core.extrusion import extrude
+from imgquad_core.second_order import second_order
 from imgquad_core.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 
@@ -115,3 +118,25 @@ def test_another_version_is_refused(tmp_path: Path) -> None:
         write_mesh(staircase(disk(4, 1), ("x" * 128, "y")), tmp_path / "a.msh")
     assert not list(tmp_path.iterdir())
     assert fe_mesh(LAYERS).kind == "quad4"
+
+
+@pytest.mark.parametrize("version", ["4.1", "2.2"])
+@pytest.mark.parametrize("kind", ["quad8", "quad9", "hex8", "cohesive", "cohesive hexes"])
+def test_gmsh_opens_all_kinds_of_elements_without_a_warning(tmp_path: Path, gmsh: Any, kind: str, version: str) -> None:
+    mesh = fe_mesh(LAYERS)
+    if kind in ("quad8", "quad9"):
+        mesh = second_order(mesh, int(kind[-1]))
+    if kind.startswith("cohesive"):
+        mesh = split_interfaces(mesh)
+    if kind.endswith(("hex8", "hexes")):
+        mesh = extrude(mesh, 2.0, 2)
+    write_mesh(mesh, tmp_path / "a.msh", version=version)
+    gmsh.open(str(tmp_path / "a.msh"))
+    names = {gmsh.model.getPhysicalName(*g) for g in gmsh.model.getPhysicalGroups()}
+    expected = {"quartz", "feldspar", *mesh.side_sets, *mesh.cohesive_cells()}
+    if kind.startswith("cohesive"):
+        assert expected <= names
+    else:
+        assert expected - {"interface_feldspar_quartz"} <= names
+    assert len(gmsh.model.mesh.getNodes()[0]) == mesh.n_points
+    assert not [line for line in gmsh.logger.get() if line.startswith(("Warning", "Error"))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,3 +81,14 @@ def test_patch_test_in_heat_with_eight_nodes(tmp_path: Path) -> None:
     write_mesh(mesh, tmp_path / "a.inp", properties=SAME, deck="thermal")
     found = solve(tmp_path / "a.inp", "*NODE PRINT, NSET=NALL\nNT")["temperatures"]
     assert np.abs(found[:, 1] - mesh.points[found[:, 0].astype(int) - 1, 0] / 40).max() < 1e-6
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_heat_flows_through_a_tube_in_axisymmetric_elements(tmp_path: Path, order: int) -> None:
+    mesh = fe_mesh(staircase(np.zeros((4, 30), int), ("tube",), lambda p: 0.5 * jiggle(p)))
+    mesh = replace(mesh, points=np.add(mesh.points, [10.0, 0.0]))
+    mesh = second_order(mesh) if order == 2 else mesh
+    write_mesh(mesh, tmp_path / "a.inp", analysis="axisymmetric", properties=SAME, deck="thermal")
+    found = solve(tmp_path / "a.inp", "*NODE PRINT, NSET=NALL\nNT")["temperatures"]
+    exact = np.log(mesh.points[found[:, 0].astype(int) - 1, 0] / 10) / np.log(4)
+    assert np.abs(found[:, 1] - exact).max() < (1e-3 if order == 1 else 2e-5)
