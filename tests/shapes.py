@@ -95,3 +95,37 @@ def any_labels(seed: int) -> Labels:
     labels = rng.integers(-1 if kind == 7 else 0, k, (n_rows, n_cols)).astype(np.int32)
     labels.flat[0] = max(labels.flat[0], 0)
     return labels
+
+
+KINDS = ("noise", "checkerboard", "stripes", "dots", "arms", "spiral", "line", "cells", "speckled", "void")
+
+
+def labels_of_kind(kind: str, n_rows: int, n_cols: int, n_colors: int, seed: int) -> Labels:
+    """Picture of one of `KINDS`; what is not told by the other arguments follows from the seed."""
+    rng = np.random.default_rng([KINDS.index(kind), n_rows, n_cols, n_colors, seed])
+    row, col = np.mgrid[:n_rows, :n_cols]
+    if kind == "checkerboard":
+        cell = rng.integers(1, 6)
+        labels = (row // cell + col // cell) % n_colors
+    elif kind == "stripes":
+        labels = (row * rng.integers(0, 3) + col * rng.integers(0, 3)) // rng.integers(1, 5) % n_colors
+    elif kind == "dots":
+        labels = np.zeros((n_rows, n_cols))
+        n = rng.integers(1, 12)
+        labels[rng.integers(0, n_rows, n), rng.integers(0, n_cols, n)] = rng.integers(0, n_colors, n)
+    elif kind == "arms":
+        x, y = col - n_cols / 2, row - n_rows / 2
+        labels = (np.arctan2(y, x) / np.pi + np.hypot(x, y) / rng.uniform(1.5, 6)) % 2 > 1
+    elif kind == "spiral":
+        labels = spiral(max(n_rows, n_cols, 3))[:n_rows, :n_cols]
+    elif kind == "line":
+        labels = rng.integers(0, n_colors, (n_rows, n_cols))[:1]
+        labels = labels.T if rng.random() < 0.5 else labels
+    elif kind in ("cells", "speckled"):
+        labels = voronoi(n_rows, n_cols, int(rng.integers(1, 12)), seed) % n_colors
+        hit = rng.random((n_rows, n_cols)) < (0.05 if kind == "speckled" else 0)
+        labels = np.where(hit, rng.integers(0, n_colors, hit.shape), labels)
+    else:
+        labels = rng.integers(-1 if kind == "void" else 0, n_colors, (n_rows, n_cols))
+        labels.flat[0] = max(labels.flat[0], 0)  # one pixel at least
+    return np.ascontiguousarray(labels, np.int32)
