@@ -19,11 +19,11 @@ from imgquad_core.errors import InputError
 
 if TYPE_CHECKING:
     from imgquad_core.model import LabelImage, QuadMesh
-    from imgquad_core.pipeline import Run
+    from imgquad_core.pipeline import MeshOptions, Run
     from imgquad_mesh.elements import ElementOptions
 
 #: formats that PyVista writes
-GRID_EXTENSIONS = (".vtu", ".vtk")
+GRID_EXTENSIONS = (".vtu", ".vtk", ".vtkhdf")
 
 
 def check_target(path: Path, extensions: tuple[str, ...]) -> None:
@@ -86,6 +86,14 @@ def write_picture(mesh: QuadMesh, path: Path) -> None:
     from imgquad_mesh.picture import draw_materials
 
     replace_file(path, lambda temporary: draw_materials(mesh, temporary))
+
+
+def write_script(options: MeshOptions, path: Path) -> None:
+    """Write a filter script that makes the same mesh of the same picture."""
+    from imgquad_mesh.templates import run_as_script
+
+    text = run_as_script(options)
+    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 def write_json(values: dict[str, Any], path: Path) -> None:

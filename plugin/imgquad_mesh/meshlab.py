@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.assembly import assemble_mesh
 from imgquad_core.errors import InputError
 from imgquad_core.model import Materials, QuadMesh
+from imgquad_core.tracing import trace_mesh
 
 from imgquad_mesh.catalogue import MissingMeshLab
 from imgquad_mesh.layer import Layer, layer_of, surface
@@ -37,14 +37,14 @@ def quad_mesh(layer: Layer, materials: Materials | None = None) -> QuadMesh:
     Parameters
     ----------
     layer : Layer
-        All its faces must have four corners, in one plane z = constant.
+        All its faces must have four corners, in one plane z = constant, and turn the same way.
     materials : Materials, optional
         What the materials are called. Without it they are named by number and coloured by the faces' colours.
 
     Raises
     ------
     InputError
-        When there are no faces, others than quads, or the mesh is not plane.
+        When there are no faces, others than quads, the mesh is not plane, folded, or has an inverted quad.
     """
     others = int(np.count_nonzero(layer.face_sizes != 4))
     if layer.n_faces == 0 or others:
@@ -56,7 +56,8 @@ def quad_mesh(layer: Layer, materials: Materials | None = None) -> QuadMesh:
     material = face_materials(layer, materials)
     if materials is None:
         materials = _named_by_number(material, layer.face_color)
-    return assemble_mesh(layer.points[:, :2].copy(), layer.face_points.reshape(-1, 4), material, materials)
+    used, corners = np.unique(layer.face_points, return_inverse=True)
+    return trace_mesh(layer.points[used, :2], corners.reshape(-1, 4), material, materials)
 
 
 def face_materials(layer: Layer, materials: Materials | None = None) -> NDArray[np.int32]:
@@ -129,7 +130,7 @@ def from_meshset(meshset: Any, materials: Materials | None = None) -> QuadMesh:
     Returns
     -------
     QuadMesh
-        Points and quads in MeshLab's order; regions and chains are found anew.
+        Points and quads in MeshLab's order, without points of no quad; regions and chains are found anew.
 
     Raises
     ------

@@ -32,6 +32,15 @@ class MeshSetLayers:
         """Return the current layer, or the one with this id."""
         return layer_of(self._meshset.current_mesh() if mesh is None else self._meshset.mesh(mesh))
 
+    def put(self, layer: Layer) -> int:
+        """Put a layer in the place of the current one, return its id."""
+        from imgquad_mesh.worker import delete_layer
+
+        former = int(self._meshset.current_mesh_id())
+        mesh = self.add(layer)
+        delete_layer(self._meshset, former)
+        return mesh
+
     def give(self, do: str, values: NDArray[Any]) -> None:
         """Change the current mesh in place; see `imgquad_mesh.worker.give`."""
         from imgquad_mesh.worker import give

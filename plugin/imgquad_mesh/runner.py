@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -78,7 +79,8 @@ class MeshLabProcess:
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout, self._errors):
             if pipe is not None:
-                pipe.close()
+                with suppress(BrokenPipeError):  # what a dead process has not read
+                    pipe.close()
 
     def ask(self, do: str, **request: Any) -> Any:
         """Send one request and return its answer.
@@ -126,6 +128,13 @@ class MeshLabProcess:
         save_layer(layer, path)
         self._saved = path
         return int(self.ask("add", file=str(path)))
+
+    def put(self, layer: Layer) -> int:
+        """Put a layer in the place of the current one. Return its id."""
+        former = self.layers[1]
+        mesh = self.add(layer)
+        self.ask("delete", mesh=former)
+        return mesh
 
     def open(self, path: Path) -> int:
         """Load a mesh file with MeshLab; it becomes the current one. Return its id."""

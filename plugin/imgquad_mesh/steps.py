@@ -15,6 +15,7 @@ from imgquad_core.denoise import DenoiseOptions, list_removed, remove_noise
 from imgquad_core.errors import InputError
 from imgquad_core.meshing import MeshingOptions, mesh_boundaries
 from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
+from imgquad_core.optimization import OptimizationOptions, optimize
 from imgquad_core.pipeline import MeshOptions, run
 from imgquad_core.quality import aspect, corner_angles, material_areas, quad_areas, quality_report, scaled_jacobian
 from imgquad_core.reading import ReadOptions, read_picture
@@ -24,6 +25,7 @@ from imgquad_core.sets import fe_mesh
 from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
 
 from imgquad_mesh.crosscheck import boundary_lengths, material_perimeters
+from imgquad_mesh.elements import ElementOptions
 from imgquad_mesh.files import check_target, mesh_extensions, read_vti, write_labels, write_mesh_file
 from imgquad_mesh.layer import Layer, polyline
 from imgquad_mesh.meshlab import face_materials, quad_layer, quad_mesh
@@ -37,6 +39,9 @@ class Meshes(Protocol):
 
     def layer(self, mesh: int | None = None) -> Layer:
         """Return the current layer, or the one with this id."""
+
+    def put(self, layer: Layer) -> int:
+        """Put a layer in the place of the current one, return its id."""
 
     def give(self, do: str, values: NDArray[Any]) -> None:
         """Set points (``move``), a value a face (``set_scalar``) or a colour a face (``set_color``), in place."""
@@ -60,6 +65,11 @@ class LayerList:
     def layer(self, mesh: int | None = None) -> Layer:
         """Return the current layer, or the one with this id."""
         return self._layers[-1 if mesh is None else mesh]
+
+    def put(self, layer: Layer) -> int:
+        """Put a layer in the place of the current one, return its id."""
+        self._layers[-1] = layer
+        return len(self._layers) - 1
 
     def give(self, do: str, values: NDArray[Any]) -> None:
         """Set points (``move``), a value a face (``set_scalar``) or a colour a face (``set_color``), in place."""
@@ -142,11 +152,12 @@ class State:
 
 
 def _moved(mesh: QuadMesh, layer: Layer) -> QuadMesh:
+    """Return a mesh with the points of its layer, where MeshLab may have moved them."""
     if np.array_equal(mesh.points, layer.points[:, :2]) and not layer.points[:, 2].any():
         return mesh
-    if (quad_areas(layer.points, mesh.quads) > 0.0).all() and not np.ptp(layer.points[:, 2]):
-        return replace(mesh, points=layer.points[:, :2])
-    return quad_mesh(layer, mesh.materials)
+    if np.ptp(layer.points[:, 2]) > 0.0 or quad_areas(layer.points, mesh.quads).sum() < 0.0:  # tilted or mirrored
+        return quad_mesh(layer, mesh.materials)
+    return replace(mesh, points=layer.points[:, :2])
 
 
 @dataclass(frozen=True)
@@ -177,9 +188,21 @@ class NoOptions:
 
 @dataclass(frozen=True)
 class MeshFileOptions:
-    """Where the mesh is written; the extension names the format."""
+    """Where the mesh is written, the extension names the format, and which elements it is made of: see `ElementOptions`."""
 
     file_name: str = "mesh.vtu"
+    order: int = 1
+    nodes: int = 8
+    cohesive: str | tuple[tuple[str, str], ...] | None = None
+    extrude: float | None = None
+    layers: int = 1
+
+    def __post_init__(self) -> None:
+        self.elements()  # checks the values
+
+    def elements(self) -> ElementOptions:
+        """Return the elements that are asked for."""
+        return ElementOptions(self.order, self.nodes, self.cohesive, self.extrude, self.layers)
 
 
 @dataclass(frozen=True)
@@ -263,6 +286,19 @@ def _mesh_image(state: State, options: MeshOptions) -> dict[str, Any]:
     return _size_of(done.mesh)
 
 
+def _optimize(state: State, options: OptimizationOptions) -> dict[str, Any]:
+    before = state.mesh()
+    after = optimize(before, options)
+    state.made[state.meshes.put(quad_layer(after, state.meshes.layer().label))] = after
+    return {f"{name}_{when}": value for when, mesh in (("before", before), ("after", after))
+            for name, value in _shape_of(mesh).items()}  # fmt: skip
+
+
+def _shape_of(mesh: QuadMesh) -> dict[str, Any]:
+    report = quality_report(mesh)
+    return {"quads_number": report.n_quads, "min_scaled_jacobian": report.min_sj, "irregular_nodes": report.irregular}
+
+
 def _size_of(mesh: QuadMesh) -> dict[str, Any]:
     return {"quads_number": mesh.n_quads, "points_number": mesh.n_points}
 
@@ -327,7 +363,7 @@ def _list_sets(state: State, options: NoOptions) -> dict[str, Any]:
 
 def _save_mesh(state: State, options: MeshFileOptions) -> dict[str, Any]:
     path = script_path(options.file_name, state.folder)
-    write_mesh_file(state.mesh(), path)
+    write_mesh_file(state.mesh(), path, options.elements())
     return {"file": str(path)}
 
 
@@ -368,6 +404,7 @@ STEPS: Mapping[str, Step] = {
     "apply_coord_material_boundary_smoothing": Step(SmoothingOptions, _smooth),
     "generate_quad_mesh_from_material_boundaries": Step(MeshingOptions, _mesh_boundary),
     "generate_quad_mesh_from_image": Step(MeshOptions, _mesh_image),
+    "meshing_quad_cleanup": Step(OptimizationOptions, _optimize),
     "compute_scalar_by_quad_quality_per_face": Step(QualityOptions, _quality_per_face),
     "compute_color_by_material_per_face": Step(NoOptions, _color_per_face),
     "get_quad_quality_measures": Step(NoOptions, _measure_quality),

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from imgquad_core.errors import InputError
 
+from imgquad_mesh.cli import fe as elements
 from imgquad_mesh.cli import options as command
 from imgquad_mesh.spec import Filter, Value
 
@@ -49,6 +50,15 @@ def _write_sizes(sizes: Mapping[Any, float] | None) -> str:
     return _joined(f"{name}={size!r}" for name, size in (sizes or {}).items())
 
 
+def _cohesive(text: str) -> str | tuple[tuple[str, str], ...] | None:
+    pairs = [elements.pair(item) for item in _items(text)]
+    return "all" if "all" in pairs else tuple(pairs) or None  # type: ignore[return-value]
+
+
+def _write_cohesive(pairs: Any) -> str:
+    return pairs if isinstance(pairs, str) else _joined(f"{a}:{b}" for a, b in pairs or ())
+
+
 _LENGTH_OR_AUTO = Text(lambda text: None if text == "auto" else command.number(text), lambda v: "auto" if v is None else repr(v))
 
 #: by name of the field
@@ -60,6 +70,8 @@ TEXTS: Mapping[str, Text] = {
     "material_sizes": Text(_sizes, _write_sizes),
     "drop": Text(lambda text: tuple(_items(text)), lambda names: _joined(map(str, names))),
     "frame": Text(lambda text: command.whole(text) if text else None, lambda v: "" if v is None else str(v)),
+    "cohesive": Text(_cohesive, _write_cohesive),
+    "extrude": Text(lambda text: command.number(text) if text else None, lambda v: "" if v is None else repr(v)),
     "crop": Text(lambda text: command.box(text) if text else None, lambda box: ",".join(map(str, box)) if box else ""),
 }
 

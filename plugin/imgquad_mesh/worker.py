@@ -148,6 +148,18 @@ def _export(pymeshlab: Any, meshes: Any, file: str) -> None:
     meshes.save_current_mesh(file)
 
 
+def delete_layer(meshes: Any, mesh: int) -> None:
+    """Delete a layer that is not the current one."""
+    current = meshes.current_mesh_id()
+    meshes.set_current_mesh(mesh)
+    meshes.delete_current_mesh()
+    meshes.set_current_mesh(current)
+
+
+def _delete(pymeshlab: Any, meshes: Any, mesh: int) -> None:
+    delete_layer(meshes, mesh)
+
+
 def _set_current(pymeshlab: Any, meshes: Any, mesh: int) -> None:
     meshes.set_current_mesh(mesh)
 
@@ -204,6 +216,7 @@ _REQUESTS: Mapping[str, Callable[..., Any]] = {
     "layers": _layers,
     "save": _save,
     "export": _export,
+    "delete": _delete,
     "set_current": _set_current,
     "give": _give,
 }

@@ -144,7 +144,7 @@ def test_scripts_of_ours_run_without_pymeshlab(tmp_path: Path) -> None:
         f"result = run_script({str(path)!r}, image={str(tmp_path / 'labels.npy')!r})\n"
         "assert result.values('get_quad_quality_measures')['min_sj'] > 0\n"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=600)
 
 
 # --------------------------------------------------------------------------------------------------- bad scripts

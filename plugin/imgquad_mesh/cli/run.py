@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from imgquad_core.errors import InputError
 from imgquad_mesh.cli.fe import add_element_options, element_options, writer_options
 from imgquad_mesh.cli.options import add_mesh_options, mesh_options, number
+from imgquad_mesh.cli.script import print_crosscheck
 
 if TYPE_CHECKING:
     from imgquad_core.pipeline import MeshOptions, Run
@@ -31,6 +32,8 @@ def add_parser(subparsers: Any) -> None:
     group.add_argument("--report", type=Path, metavar="FILE", help="all figures: .json")
     group.add_argument("--picture", type=Path, metavar="FILE", help="the mesh coloured by material: .png .svg .pdf")
     group.add_argument("--min-quality", type=number, metavar="Q", help="code 3 if a quad's scaled Jacobian is below Q")
+    group.add_argument("--save-script", type=Path, metavar="FILE", help="the run as a filter script: .mlx")
+    group.add_argument("--crosscheck", action="store_true", help="code 3 if MeshLab or PyVista measure other figures")
     group.add_argument("--quiet", action="store_true", help="print nothing but errors")
     parser.set_defaults(execute=execute)
 
@@ -44,6 +47,7 @@ class Outputs:
     boundaries: Path | None = None
     report: Path | None = None
     picture: Path | None = None
+    script: Path | None = None
 
     def check(self) -> None:
         """Raise `InputError` if one of them could not be written, before any work is done."""
@@ -55,6 +59,7 @@ class Outputs:
             "boundaries": (".vtp",),
             "report": (".json",),
             "picture": (".png", ".svg", ".pdf"),
+            "script": (".mlx",),
         }
         targets = {name: path for name in allowed if (path := getattr(self, name)) is not None}
         for name, path in targets.items():
@@ -73,10 +78,18 @@ class Writing:
 
 def execute(args: argparse.Namespace) -> int:
     """Mesh the picture that `args` names; return the exit code."""
-    outputs = Outputs(args.output, args.labels_out, args.boundaries_out, args.report, args.picture)
+    outputs = Outputs(
+        args.output, args.labels_out, args.boundaries_out, args.report, args.picture, args.save_script
+    )
     writing = Writing(element_options(args), writer_options(args))
     return mesh_to_files(
-        args.image, mesh_options(args), outputs, writing, quiet=args.quiet, min_quality=args.min_quality
+        args.image,
+        mesh_options(args),
+        outputs,
+        writing,
+        quiet=args.quiet,
+        min_quality=args.min_quality,
+        crosscheck=args.crosscheck,
     )
 
 
@@ -88,6 +101,7 @@ def mesh_to_files(
     *,
     quiet: bool = False,
     min_quality: float | None = None,
+    crosscheck: bool = False,
 ) -> int:
     """Mesh a picture, write what is asked for, print the report; return the exit code.
 
@@ -96,15 +110,19 @@ def mesh_to_files(
     InputError
         The picture cannot be used or a file cannot be written.
     QualityError
-        A quad is below `min_quality`; all files are written.
+        A quad is below `min_quality`, or with `crosscheck` another program measures other figures; all files are
+        written.
     """
     from imgquad_core.quality import require_quality
+    from imgquad_mesh.catalogue import meshlab_filters
     from imgquad_mesh.cli.console import announce_compiling, print_report, progress_bar_if
     from imgquad_mesh.files import write_json
     from imgquad_mesh.report import build_report
 
     start = perf_counter()
     outputs.check()
+    if crosscheck:
+        meshlab_filters()  # where pymeshlab is missing, that is said before any work is done
     if not quiet:
         announce_compiling()
     with progress_bar_if(not quiet) as progress:
@@ -119,6 +137,8 @@ def mesh_to_files(
         write_json(report, outputs.report)
     if not quiet:
         print_report(report)
+    if crosscheck:
+        print_crosscheck(run.mesh, quiet)
     if min_quality is not None:
         require_quality(run.mesh, min_quality)
     return 0
@@ -143,4 +163,6 @@ def _write(run: Run, outputs: Outputs, writing: Writing) -> None:
         files.write_boundaries(run, outputs.boundaries)
     if outputs.picture:
         files.write_picture(run.mesh, outputs.picture)
+    if outputs.script:
+        files.write_script(run.options, outputs.script)
     files.write_mesh_file(run.mesh, outputs.mesh, writing.elements, **writing.options)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from imgquad_mesh.cli.options import number
 
 if TYPE_CHECKING:
+    from imgquad_core.model import QuadMesh
     from imgquad_mesh.script import ScriptResult
 
 #: endings of inputs that are meshes; all others are pictures
@@ -80,6 +81,16 @@ def report_of(result: ScriptResult) -> dict[str, Any]:
         for s in result.steps
     ]  # fmt: skip
     return {"steps": steps}
+
+
+def print_crosscheck(mesh: QuadMesh, quiet: bool) -> None:
+    """Measure a mesh with MeshLab and PyVista, too; QualityError where their figures are others."""
+    from imgquad_mesh.crosscheck import crosscheck
+
+    found = crosscheck(mesh)
+    if not quiet:
+        print(found.table)
+    found.require(mesh)
 
 
 def _announce(name: str, n: int, total: int) -> None:
