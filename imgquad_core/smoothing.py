@@ -24,6 +24,7 @@ from imgquad_core.model import VOID, BoundaryGraph, PointKind
 from imgquad_core.polylines import Nodes
 from imgquad_core.resolving import Draft, place_freely, restore_areas_freely
 from imgquad_core.spacing import edge_sizes
+from imgquad_core.stretching import stretch
 
 _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign points that both move it cannot meet
 _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for areas
@@ -71,7 +72,9 @@ class SmoothingOptions:
             raise InputError(f"max_shift is {self.max_shift}; give a length from 0 to 10 px")
 
 
-def smooth_boundaries(graph: BoundaryGraph, options: SmoothingOptions | None = None) -> BoundaryGraph:
+def smooth_boundaries(
+    graph: BoundaryGraph, options: SmoothingOptions | None = None, shape: tuple[int, int] | None = None
+) -> BoundaryGraph:
     """Smooth a pixel boundary and cut it into edges of the wanted length.
 
     Parameters
@@ -80,6 +83,9 @@ def smooth_boundaries(graph: BoundaryGraph, options: SmoothingOptions | None = N
         What `extract_boundaries` gave.
     options : SmoothingOptions, optional
         Sizes and limits.
+    shape : tuple of int, optional
+        (height, width) of the picture in true shape where pixels are not square: the boundary is smoothed in pixels,
+        stretched to [0, width] x [0, height], and cut into edges there.
 
     Returns
     -------
@@ -95,6 +101,8 @@ def smooth_boundaries(graph: BoundaryGraph, options: SmoothingOptions | None = N
     room = _room(curves, is_corner, options.max_shift)
     node = place_junctions(curves, ends, room, graph.shape)
     smooth = _smooth(curves, node, is_corner, room)
+    if shape is not None:
+        graph, curves, ends, node, smooth = stretch(graph, curves, ends, node, smooth, shape)
     draft = Draft(curves, ends, smooth, node, is_corner, limit, options.edge_ratio, graph.shape)
     size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, graph.shape)
     nodes, gently = place_freely(draft, size)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from numbers import Number
 from typing import Any
 
+import numpy as np
 import pyvista_validation
 
 from imgquad_mesh.spec import Parameter, filters
@@ -48,7 +50,7 @@ def _limits(parameter: Parameter) -> tuple[float, float] | None:
 
 
 def _number(value: Any, name: str, whole: bool = False, limits: tuple[float, float] | None = None) -> Any:
-    if value is None or isinstance(value, str):  # what NumPy says of these is not about the parameter
+    if not isinstance(value, (Number, np.ndarray)):  # what NumPy says of these does not name the parameter
         raise TypeError(f"{name} must be a number. Got {type(value)} instead.")
     made = _validation.validate_number(
         value, must_be_finite=True, must_be_real=True, must_be_integer=whole, must_be_in_range=limits, name=name
@@ -57,7 +59,9 @@ def _number(value: Any, name: str, whole: bool = False, limits: tuple[float, flo
 
 
 def _length(value: Any, name: str) -> float:
-    return float(_number(value, name))
+    length = float(_number(value, name))
+    _validation.check_greater_than(length, 0.0, name=name)
+    return length
 
 
 def _length_or_none(value: Any, name: str) -> float | None:

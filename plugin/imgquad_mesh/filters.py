@@ -16,6 +16,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import pyvista as pv
 
+from imgquad_core.errors import InputError
 from imgquad_mesh.grid_filters import Effort, boundaries_of_mesh, optimize, plot, quadratic, quality, report
 from imgquad_mesh.progress import progress_of
 
@@ -162,7 +163,7 @@ def boundaries(
     Parameters
     ----------
     image : pyvista.ImageData
-        One pixel thick; segmented first where it is not yet. Pixels that are not square are cut into square ones.
+        One pixel thick; segmented first where it is not yet.
     scalars : str, optional
         Name of scalars to process. Defaults to currently active scalars.
     policy : str, default: "minority"
@@ -179,20 +180,17 @@ def boundaries(
         the left and right, -1 for none, as in :meth:`pyvista.ImageDataFilters.contour_labels`), ``boundary_regions``
         and ``chain``; point array ``point_kind`` (0 inside a chain, 1 junction, 2 on the border, 3 corner).
     """
-    from imgquad_core.boundary import ExtractionOptions, extract_boundaries
-    from imgquad_core.selection import assert_solid
-    from imgquad_mesh.boundaries import Boundaries, to_lines
+    from imgquad_core.boundary import ExtractionOptions
+    from imgquad_mesh.boundaries import to_lines
     from imgquad_mesh.checks import checked
     from imgquad_mesh.convert import image_placement
-    from imgquad_mesh.materials import segmented, square_pixels
+    from imgquad_mesh.materials import segmented
+    from imgquad_mesh.stages import extracted
 
     options = ExtractionOptions(**checked(policy=policy))
     with progress_of(progress_bar) as begin:
         begin("boundary")
-        found = segmented(image, scalars).image
-        assert_solid(found)
-        labels, placement = square_pixels(found, image_placement(image, scalars))
-        return to_lines(Boundaries(extract_boundaries(labels, options), labels.materials, placement, None))
+        return to_lines(extracted(segmented(image, scalars).image, image_placement(image, scalars), options))
 
 
 def smooth(
@@ -240,25 +238,22 @@ def smooth(
     pyvista.PolyData
         The boundaries that are meshed, with the same arrays.
     """
-    from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
+    from imgquad_core.smoothing import SmoothingOptions
     from imgquad_mesh.boundaries import from_lines, to_lines
     from imgquad_mesh.checks import checked
+    from imgquad_mesh.stages import smoothed
 
     values = checked(growth=growth, edge_ratio=edge_ratio, max_shift=max_shift)
     sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
     repeat = checked(periodic=periodic)["periodic"]
     given = from_lines(lines)
+    if given.sizes is not None:
+        raise InputError("these boundaries are smooth already: smooth those that image.imgquad.boundaries() gave")
     sizes = _in_pixels(sizes, unit, given.placement.pixel_size)
     sizes["material_sizes"] = _numbered(sizes["material_sizes"], given.materials)
-    options = SmoothingOptions(**sizes, **values)
     with progress_of(progress_bar) as begin:
         begin("smooth")
-        graph = smooth_boundaries(given.graph, options)
-        if repeat != "none":
-            from imgquad_core.periodic import match_opposite_sides
-
-            graph = match_opposite_sides(graph, repeat)
-    return to_lines(given._replace(graph=graph, sizes=(options.size, options.growth, sizes["material_sizes"])))
+        return to_lines(smoothed(given, SmoothingOptions(**sizes, **values), repeat))
 
 
 def quads(
@@ -298,24 +293,28 @@ def quads(
     pyvista.UnstructuredGrid
         As `mesh` gives it.
     """
-    from imgquad_core.errors import InputError
-    from imgquad_core.meshing import MeshingOptions, mesh_boundaries
+    from imgquad_core.meshing import MeshingOptions
     from imgquad_mesh.boundaries import from_lines
     from imgquad_mesh.checks import checked
     from imgquad_mesh.convert import to_grid
+    from imgquad_mesh.stages import filled
 
     given = from_lines(lines)
     if given.sizes is None:
         raise InputError("these boundaries are not smoothed: call .imgquad.smooth(size=...) on them first")
-    pixel, values = given.placement.pixel_size, checked(effort=effort, threads=threads)
-    values["growth"] = given.sizes[1] if growth is None else checked(growth=growth)["growth"]
-    asked = _in_pixels(checked(inner_size=size, material_sizes=material_sizes), unit, pixel)
-    values["size"] = asked["inner_size"] or given.sizes[0] if size is None else asked["inner_size"]
-    own = given.sizes[2] if material_sizes is None else _numbered(asked["material_sizes"], given.materials)
-    options = MeshingOptions(**values, material_sizes=own)
+    asked = checked(inner_size=size, material_sizes=material_sizes)
+    asked = _in_pixels(asked, unit, given.placement.pixel_size)
+    options = MeshingOptions(
+        size=given.sizes[0] if size is None else asked["inner_size"],
+        growth=given.sizes[1] if growth is None else checked(growth=growth)["growth"],
+        material_sizes=given.sizes[2]
+        if material_sizes is None
+        else _numbered(asked["material_sizes"], given.materials),
+        **checked(effort=effort, threads=threads),
+    )
     with progress_of(progress_bar) as begin:
         begin("mesh")
-        return to_grid(mesh_boundaries(given.graph, options, given.materials), given.placement)
+        return to_grid(filled(given, options), given.placement)
 
 
 def mesh(
@@ -409,12 +408,14 @@ def mesh(
     >>> mesh.bounds[:4]
     (-0.5, 59.5, -0.5, 39.5)
     """
-    from imgquad_core.pipeline import MeshOptions, run
+    from imgquad_core.boundary import ExtractionOptions
+    from imgquad_core.pipeline import MeshOptions
     from imgquad_core.segmentation import SegmentationOptions
     from imgquad_core.selection import drop_materials as drop_from
     from imgquad_mesh.checks import checked
     from imgquad_mesh.convert import image_placement, to_grid
-    from imgquad_mesh.materials import segmented, square_pixels
+    from imgquad_mesh.materials import segmented
+    from imgquad_mesh.stages import extracted, filled, smoothed
 
     sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
     values = checked(growth=growth, policy=policy, edge_ratio=edge_ratio, max_shift=max_shift, effort=effort)
@@ -422,16 +423,21 @@ def mesh(
     early = checked(colors=colors, drop_transparent=drop_transparent)
     last = checked(drop=drop, sample=sample)
     placement = image_placement(image, scalars)
-    sizes = _in_pixels(sizes, unit, placement.pixel_size)
-    options = MeshOptions(**sizes, **values, min_pixels=0, min_length=0.0)  # noise goes before pixels are made square
+    options = MeshOptions(**_in_pixels(sizes, unit, placement.pixel_size), **values)
     columns = _columns(image, last["sample"], scalars)
     with progress_of(progress_bar) as begin:
         begin("segment")
-        found = _without_noise(segmented(image, scalars, SegmentationOptions(**early)), min_pixels, min_length)
-        labels, placement = square_pixels(drop_from(found.image, last["drop"]), placement)
-        made = run(labels, options, lambda stage, number, total: begin(stage)).mesh
-    grid = to_grid(made, placement)
-    _sample(grid, made, columns, labels.shape)
+        found = segmented(image, scalars, SegmentationOptions(**early))
+        begin("denoise")
+        labels = drop_from(_without_noise(found, min_pixels, min_length).image, last["drop"])
+        begin("boundary")
+        lines = extracted(labels, placement, ExtractionOptions(options.policy))
+        begin("smooth")
+        lines = smoothed(lines, options.smoothing(labels.materials), options.periodic)
+        begin("mesh")
+        made = filled(lines, options.meshing(labels.materials))
+    grid = to_grid(made, lines.placement)
+    _sample(grid, made, columns, lines.graph.shape)
     return grid
 
 
@@ -479,7 +485,7 @@ def _columns(image: pv.ImageData, names: Sequence[str], scalars: str | None) -> 
 
 
 def _sample(grid: pv.UnstructuredGrid, made: Any, columns: Mapping[str, Any], shape: tuple[int, int]) -> None:
-    """Put means of arrays over each quad into a grid, in place; `shape` is that of the square pixels."""
+    """Put means of arrays over each quad into a grid, in place; `made` lies on a picture of `shape` (height, width)."""
     from imgquad_core.sampling import area_means
 
     for name, values in columns.items():

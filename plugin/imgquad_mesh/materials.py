@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pyvista as pv
 
 from imgquad_core.errors import InputError
 from imgquad_core.model import LabelImage
-from imgquad_core.reading import ReadOptions
 from imgquad_core.segmentation import Segmentation, SegmentationOptions, segment_picture
-from imgquad_mesh.convert import Placement, image_array, materials_of, put_materials, scalars_of
+from imgquad_mesh.convert import image_array, materials_of, put_materials, scalars_of
 
 MATERIAL = "material"  #: array that a segmented image has
 QUANTISED = "material_quantised"  #: field array: 1 where colours were quantised and noise is not removed yet
@@ -43,24 +40,3 @@ def with_materials(image: pv.ImageData, found: Segmentation, scalars: str | None
     out.field_data[QUANTISED] = np.array([found.quantised], np.uint8)
     out.set_active_scalars(MATERIAL, preference="point" if association == "point" else "cell")
     return out
-
-
-def square_pixels(image: LabelImage, placement: Placement) -> tuple[LabelImage, Placement]:
-    """Return the picture on square pixels: the longer side of a pixel is cut into pieces as long as the shorter one.
-
-    Each new pixel has the material of the old one that its centre is in. The picture covers the same place; as its
-    rows and columns are whole, pixels are square to within half a pixel over the whole picture.
-    """
-    sides = np.linalg.norm(placement.axes, axis=1)  # of a column, of a row
-    old = np.array(image.shape[::-1])
-    new = np.maximum(np.rint(old * sides / sides.min()), 1).astype(np.int64)
-    if (new == old).all():
-        return image, placement
-    if new.prod() > ReadOptions.max_pixels:
-        raise InputError(
-            f"spacing {sides[0]:g} x {sides[1]:g} would need {new[0]} x {new[1]} square pixels: resample the image, "
-            "for example image.resample(...)"
-        )
-    columns, rows = (((np.arange(n) + 0.5) * m / n).astype(np.int64) for n, m in zip(new, old, strict=True))
-    axes = placement.axes * (old / new)[:, None]
-    return LabelImage(image.labels[np.ix_(rows, columns)], image.materials), replace(placement, axes=axes)
