@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pymeshlab
+
 from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, script_text
 from imgquad_mesh.spec import python_name
 

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 
 from imgquad_core.errors import InputError
-
 from imgquad_mesh.names import pymeshlab_folder
 
 #: a filter that pymeshlab has only when it could load all its plugins

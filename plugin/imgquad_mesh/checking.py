@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from imgquad_core.errors import InputError, ScriptError
-
 from imgquad_mesh.catalogue import PRINTED_TYPES, MissingMeshLab, meshlab_filters, meshlab_parameters
 from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, ScriptValue, script_text
 from imgquad_mesh.names import all_meshlab_names, meshlab_function, nearest
@@ -100,9 +99,11 @@ def checked_steps(script: Script, folder: Path) -> list[OwnStep | MeshLabStep]:
         filter is not ours.
     """
     functions = {id(f): _function_of(script, f) for f in script.filters}
-    asked = meshlab_parameters(frozenset(f for f in functions.values() if f not in filters())) if any(
-        f not in filters() for f in functions.values()
-    ) else {}
+    asked = (
+        meshlab_parameters(frozenset(f for f in functions.values() if f not in filters()))
+        if any(f not in filters() for f in functions.values())
+        else {}
+    )
     steps: list[OwnStep | MeshLabStep] = []
     for each in script.filters:
         function = functions[id(each)]

@@ -21,7 +21,6 @@ from imgquad_core.errors import QualityError
 from imgquad_core.halfedge import components, twins_of
 from imgquad_core.model import VOID, QuadMesh
 from imgquad_core.quality import corner_angles, material_areas, quad_areas, scaled_jacobian
-
 from imgquad_mesh.meshlab import quad_layer
 from imgquad_mesh.runner import MeshLabProcess
 
@@ -76,7 +75,9 @@ class CrossCheck:
     def table(self) -> str:
         """The comparisons as text, one line each."""
         rows = [("figure", "ours", "other", "by", "difference")]
-        rows += [(c.name, f"{c.ours:.10g}", f"{c.theirs:.10g}", c.program, f"{c.difference:.1e}") for c in self.comparisons]
+        rows += [
+            (c.name, f"{c.ours:.10g}", f"{c.theirs:.10g}", c.program, f"{c.difference:.1e}") for c in self.comparisons
+        ]
         widths = [max(len(row[i]) for row in rows) for i in range(5)]
         lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
         return "\n".join(lines)
@@ -86,7 +87,9 @@ class CrossCheck:
         apart = [c for c in self.comparisons if not c.agrees]
         if apart:
             told = "; ".join(f"{c.name}: {c.ours:.10g}, {c.program} {c.theirs:.10g}" for c in apart[:5])
-            raise QualityError(f"{len(apart)} of {len(self.comparisons)} figures differ by more than {TOLERANCE:g}: {told}", mesh)
+            raise QualityError(
+                f"{len(apart)} of {len(self.comparisons)} figures differ by more than {TOLERANCE:g}: {told}", mesh
+            )
 
 
 def crosscheck(mesh: QuadMesh, deadline: float = 120.0) -> CrossCheck:
@@ -222,7 +225,8 @@ def chain_lengths(mesh: QuadMesh) -> NDArray[np.float64]:
     ends = mesh.points[mesh.constraints]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     counts = np.diff(mesh.chain_offsets) - 1
-    return np.bincount(np.repeat(np.arange(len(counts)), counts), weights=lengths, minlength=len(counts))
+    chain = np.repeat(np.arange(len(counts)), counts)
+    return np.asarray(np.bincount(chain, weights=lengths, minlength=len(counts)), np.float64)
 
 
 def boundary_lengths(mesh: QuadMesh) -> tuple[float, float]:

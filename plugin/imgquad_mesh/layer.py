@@ -216,7 +216,7 @@ def _polygons(mesh: Any) -> list[NDArray[Any]]:
 
 
 def _bytes(color: Any) -> NDArray[np.uint8]:
-    return np.rint(np.asarray(color) * 255).astype(np.uint8)
+    return np.asarray(np.rint(np.asarray(color) * 255), np.uint8)
 
 
 def _material(mesh: Any, first: Ints) -> NDArray[np.int32] | None:
@@ -224,7 +224,7 @@ def _material(mesh: Any, first: Ints) -> NDArray[np.int32] | None:
         values = np.asarray(mesh.face_custom_scalar_attribute_array("material"))
     except Exception:  # pymeshlab cannot be asked whether there is such an attribute
         return None
-    return np.rint(values[first]).astype(np.int32)
+    return np.asarray(np.rint(values[first]), np.int32)
 
 
 def _triangle_of_face(offsets: Ints, corners: Ints, triangles: Ints) -> Ints:
@@ -239,7 +239,7 @@ def _triangle_of_face(offsets: Ints, corners: Ints, triangles: Ints) -> Ints:
     order = np.argsort(keys, kind="stable")
     wanted = corners[offsets[:-1]] * n + corners[offsets[:-1] + 1]
     at = np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)
-    return order[at] // 3
+    return np.asarray(order[at] // 3)
 
 
 def face_of_triangle(layer: Layer, triangles: Ints) -> Ints:
@@ -264,4 +264,4 @@ def face_of_triangle(layer: Layer, triangles: Ints) -> Ints:
     wanted = triangles * n + np.roll(triangles, -1, axis=1)
     at = np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)
     found = keys[order][at] == wanted
-    return owner[order[at[np.arange(len(triangles)), np.argmax(found, axis=1)]]]
+    return np.asarray(owner[order[at[np.arange(len(triangles)), np.argmax(found, axis=1)]]])

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from imgquad_core.errors import InputError
 from imgquad_core.model import Materials, QuadMesh
 from imgquad_core.tracing import trace_mesh
-
 from imgquad_mesh.catalogue import MissingMeshLab
 from imgquad_mesh.layer import Layer, layer_of, surface
 
@@ -68,12 +67,14 @@ def face_materials(layer: Layer, materials: Materials | None = None) -> NDArray[
     """
     if layer.material is not None:
         return layer.material
-    if materials is not None and layer.face_color is not None and len(np.unique(materials.colors, axis=0)) == len(
-        materials.labels
+    if (
+        materials is not None
+        and layer.face_color is not None
+        and len(np.unique(materials.colors, axis=0)) == len(materials.labels)
     ):
         same = (layer.face_color[:, None, :3] == materials.colors[None]).all(axis=2)
         if same.any(axis=1).all():
-            return materials.labels[np.argmax(same, axis=1)]
+            return np.asarray(materials.labels[np.argmax(same, axis=1)])
     scalar = layer.face_scalar
     if scalar is not None and (scalar == np.rint(scalar)).all() and np.abs(scalar).max(initial=0.0) < 2**31:
         return scalar.astype(np.int32)

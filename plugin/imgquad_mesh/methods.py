@@ -1,4 +1,4 @@
-"""Our filters as methods of ``pymeshlab.MeshSet``, beside MeshLab's own. Opt-in: pymeshlab is changed for all who use it."""
+"""Our filters as methods of ``pymeshlab.MeshSet``, beside MeshLab's own. Opt-in: all who use pymeshlab get them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from weakref import WeakKeyDictionary
 from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
-
 from imgquad_mesh.layer import Layer, layer_of
 from imgquad_mesh.meshlab import add_to, new_meshset
 from imgquad_mesh.spec import Filter, filters
-from imgquad_mesh.steps import STEPS, State
+from imgquad_mesh.state import State
+from imgquad_mesh.steps import STEPS
 from imgquad_mesh.texts import options_from
 
 
@@ -74,8 +74,8 @@ def install_meshlab_filters() -> tuple[str, ...]:
     Notes
     -----
     Parameters are MeshLab-like (``maxshift=1``) or ours (``max_shift=1``). Filters that work on a picture also take
-    ``image``: a path, an array or a LabelImage, kept for the calls that follow. ``ms.apply_filter`` and MeshLab's own way
-    of running scripts do not know them.
+    ``image``: a path, an array or a LabelImage, kept for the calls that follow. ``ms.apply_filter`` and MeshLab's own
+    way of running scripts do not know them.
 
     Examples
     --------

@@ -103,7 +103,9 @@ def read_script(path: str | Path) -> Script:
     if len(data) > MAX_BYTES:
         raise ScriptError(f"has more than {MAX_BYTES} bytes; split it into several scripts", str(path))
     if re.search(rb"<!DOCTYPE[^>\[]*\[", data):
-        raise ScriptError("declares elements, attributes or entities of its own; a filter script needs none", str(path), 1)
+        raise ScriptError(
+            "declares elements, attributes or entities of its own; a filter script needs none", str(path), 1
+        )
     handler = _Handler(str(path))
     parser = defusedxml.expatreader.create_parser(forbid_dtd=False, forbid_entities=True, forbid_external=True)
     parser.setContentHandler(handler)
@@ -163,7 +165,9 @@ class _Handler(ContentHandler):
         depth = len(self._open)
         self._open.append(name)
         if name in ("xmlfilter", "xmlparam"):
-            self.fail(f"has <{name}>, the form that meshlabserver took until 2020; write <filter name=…> with <Param …/>")
+            self.fail(
+                f"has <{name}>, the form that meshlabserver took until 2020; write <filter name=…> with <Param …/>"
+            )
         if depth > 2 or name != ("FilterScript", "filter", "Param")[depth]:
             self.fail(f"has <{name}> where <{('FilterScript', 'filter', 'Param', 'nothing')[min(depth, 3)]}> belongs")
         if depth == 1:
@@ -248,7 +252,9 @@ def _choices(attrs: Mapping[str, str], value: int) -> tuple[str, ...]:
     n = _whole(attrs, "enum_cardinality", 1, 10_000)
     texts = tuple(_given(attrs, f"enum_val{i}") for i in range(n))
     if not 0 <= value < n:
-        raise ValueError(f"value is {value}; give 0 to {n - 1}: " + ", ".join(f"{i} = {t}" for i, t in enumerate(texts)))
+        raise ValueError(
+            f"value is {value}; give 0 to {n - 1}: " + ", ".join(f"{i} = {t}" for i, t in enumerate(texts))
+        )
     return texts
 
 

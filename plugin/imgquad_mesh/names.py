@@ -84,4 +84,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 def all_meshlab_names(known: Collection[str]) -> list[str]:
     """Return what a user may have meant: pymeshlab's names and what is left of the display names."""
-    return [*known, *(name.replace("_", " ") for name, function in _display_names(pymeshlab_folder()).items() if function in known)]
+    return [
+        *known,
+        *(name.replace("_", " ") for name, function in _display_names(pymeshlab_folder()).items() if function in known),
+    ]

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.errors import ImgquadError
-
 from imgquad_mesh.catalogue import meshlab_filters
 from imgquad_mesh.layer import Layer, load_layer, save_layer
 
@@ -160,7 +159,9 @@ class MeshLabProcess:
         answer = self.ask("apply", function=function, parameters=list(parameters), script=script)
         ignored = re.search(r"parameter (\S+) not required", self._messages()[len(printed) :])
         if answer.get("by_script") and ignored:
-            raise MeshLabError(f"MeshLab does not know the parameter {ignored[1]} by this name; write it as MeshLab does")
+            raise MeshLabError(
+                f"MeshLab does not know the parameter {ignored[1]} by this name; write it as MeshLab does"
+            )
         if not function.startswith(_HARMLESS):
             self._keep()
         return dict(answer["values"])

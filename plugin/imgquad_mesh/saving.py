@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from imgquad_core.errors import InputError
-
 from imgquad_mesh.files import check_target, mesh_extensions, replace_file, write_mesh_file
 from imgquad_mesh.layer import Layer, surface, write_ply
 from imgquad_mesh.runner import MeshLabError, MeshLabProcess
-from imgquad_mesh.steps import State
+from imgquad_mesh.state import State
 
 #: formats that keep polygons when MeshLab writes them; its PLY has triangles only
 _MESHLAB_POLYGONS = (".obj", ".off")
@@ -30,8 +29,8 @@ def check_saving(path: Path) -> None:
 def save_current(state: State, process: MeshLabProcess | None, path: Path) -> None:
     """Write the current layer.
 
-    A PLY keeps all faces, colours and values; a mesh of quads goes to any format of ours; other layers to the formats of
-    MeshLab. OBJ and OFF are MeshLab's where it runs: with colours.
+    A PLY keeps all faces, colours and values; a mesh of quads goes to any format of ours; other layers to the formats
+    of MeshLab. OBJ and OFF are MeshLab's where it runs: with colours.
     """
     ids, _ = state.meshes.layers
     if not ids:
@@ -62,19 +61,23 @@ def _export(process: MeshLabProcess, path: Path) -> None:
     except MeshLabError as error:
         raise InputError(f"cannot write {path}: {error}; formats of MeshLab: .ply .obj .off .stl and more") from error
     except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}; give another folder or free some space") from error
+        raise InputError(
+            f"cannot write {path}: {error.strerror or error}; give another folder or free some space"
+        ) from error
 
 
 def read_grid(path: Path) -> Layer:
     """Read a mesh of quads that PyVista saved; its cell array ``material`` tells the materials."""
     import pyvista as pv
 
+    from imgquad_mesh.grids import quads_of
+
     if not path.is_file():
         raise InputError(f"there is no mesh {path}; give the path of a file")
     grid = pv.read(path)
-    if not isinstance(grid, pv.UnstructuredGrid) or set(grid.cells_dict) != {pv.CellType.QUAD}:
-        raise InputError(f"mesh {path} has other cells than quads; give a mesh of VTK_QUAD cells")
-    quads = grid.cells_dict[pv.CellType.QUAD]
+    if not isinstance(grid, pv.UnstructuredGrid):
+        raise InputError(f"mesh {path} is a {type(grid).__name__}; give an UnstructuredGrid of quads")
+    quads = quads_of(grid)
     points = np.asarray(grid.points, np.float64)
     if "material" not in grid.cell_data:
         return surface(points, quads, label=path.name)

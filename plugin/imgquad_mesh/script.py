@@ -13,7 +13,6 @@ from typing import Any, TypeAlias
 
 from imgquad_core.errors import ImgquadError, InputError, ScriptError
 from imgquad_core.model import LabelImage, QuadMesh
-
 from imgquad_mesh.checking import MeshLabStep, OwnStep, checked_steps
 from imgquad_mesh.files import GRID_EXTENSIONS, replace_file
 from imgquad_mesh.layer import Layer, layer_of, write_ply
@@ -21,7 +20,8 @@ from imgquad_mesh.meshlab import add_to
 from imgquad_mesh.mlx import read_script
 from imgquad_mesh.runner import MeshLabError, MeshLabProcess
 from imgquad_mesh.saving import check_saving, read_grid, save_current
-from imgquad_mesh.steps import STEPS, LayerList, Meshes, State
+from imgquad_mesh.state import LayerList, State
+from imgquad_mesh.steps import STEPS
 
 Progress: TypeAlias = Callable[[str, int, int], None]
 
@@ -152,9 +152,7 @@ def run_script(
     return result
 
 
-def _announced(
-    steps: list[OwnStep | MeshLabStep], progress: Progress | None
-) -> Iterator[OwnStep | MeshLabStep]:
+def _announced(steps: list[OwnStep | MeshLabStep], progress: Progress | None) -> Iterator[OwnStep | MeshLabStep]:
     for number, step in enumerate(steps):
         if progress:
             progress(step.name, number, len(steps))

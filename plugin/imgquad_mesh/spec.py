@@ -24,7 +24,13 @@ from imgquad_core.errors import InputError
 Value: TypeAlias = bool | int | float | str
 
 #: type in filters.xml -> type in a script; a bounded number (ABSPERC_GUI, SLIDER_GUI) has its own
-_SCRIPT_TYPES = {"Boolean": "RichBool", "Int": "RichInt", "Real": "RichFloat", "String": "RichString", "Enum": "RichEnum"}
+_SCRIPT_TYPES = {
+    "Boolean": "RichBool",
+    "Int": "RichInt",
+    "Real": "RichFloat",
+    "String": "RichString",
+    "Enum": "RichEnum",
+}
 _BOUNDED_TYPES = {"ABSPERC_GUI": "RichAbsPerc", "SLIDER_GUI": "RichDynamicFloat"}
 _ENUM = re.compile(r"Enum \{(.*)\}")
 
@@ -125,13 +131,14 @@ class Parameter:
         return str(value)
 
     def _checked_number(self, value: Any) -> float | int:
-        wanted: tuple[type, ...] = (int,) if self.kind == "Int" else (int, float)
-        if isinstance(value, bool) or not isinstance(value, wanted) or not math.isfinite(value):
-            kind = "a whole number" if self.kind == "Int" else "a finite number"
+        whole = self.kind == "Int"
+        right = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
+        if not right or not math.isfinite(value):
+            kind = "a whole number" if whole else "a finite number"
             raise InputError(f"parameter {self.name} is {value!r}; give {kind}")
         if (self.low is not None and value < self.low) or (self.high is not None and value > self.high):
             raise InputError(f"parameter {self.name} is {value:g}; give a number from {self.low:g} to {self.high:g}")
-        return value if self.kind == "Int" else float(value)
+        return int(value) if whole else float(value)
 
 
 @dataclass(frozen=True)

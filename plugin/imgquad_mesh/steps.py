@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,146 +18,17 @@ from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
 from imgquad_core.optimization import OptimizationOptions, optimize
 from imgquad_core.pipeline import MeshOptions, run
 from imgquad_core.quality import aspect, corner_angles, material_areas, quad_areas, quality_report, scaled_jacobian
-from imgquad_core.reading import ReadOptions, read_picture
+from imgquad_core.reading import read_picture
 from imgquad_core.segmentation import SegmentationOptions, segment_picture
 from imgquad_core.selection import Box, crop_image, drop_materials, material_number
 from imgquad_core.sets import fe_mesh
 from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
-
 from imgquad_mesh.crosscheck import boundary_lengths, material_perimeters
 from imgquad_mesh.elements import ElementOptions
-from imgquad_mesh.files import check_target, mesh_extensions, read_vti, write_labels, write_mesh_file
-from imgquad_mesh.layer import Layer, polyline
-from imgquad_mesh.meshlab import face_materials, quad_layer, quad_mesh
-
-
-class Meshes(Protocol):
-    """Layers in order, one of them current: in Python, in a MeshSet, or in the process that has one."""
-
-    def add(self, layer: Layer) -> int:
-        """Add a layer, make it the current one, return its id."""
-
-    def layer(self, mesh: int | None = None) -> Layer:
-        """Return the current layer, or the one with this id."""
-
-    def put(self, layer: Layer) -> int:
-        """Put a layer in the place of the current one, return its id."""
-
-    def give(self, do: str, values: NDArray[Any]) -> None:
-        """Set points (``move``), a value a face (``set_scalar``) or a colour a face (``set_color``), in place."""
-
-    @property
-    def layers(self) -> tuple[list[int], int | None]:
-        """Ids of all layers and of the current one."""
-
-
-class LayerList:
-    """The layers of a script that has met no filter of MeshLab yet."""
-
-    def __init__(self) -> None:
-        self._layers: list[Layer] = []
-
-    def add(self, layer: Layer) -> int:
-        """Add a layer, make it the current one, return its id."""
-        self._layers.append(layer)
-        return len(self._layers) - 1
-
-    def layer(self, mesh: int | None = None) -> Layer:
-        """Return the current layer, or the one with this id."""
-        return self._layers[-1 if mesh is None else mesh]
-
-    def put(self, layer: Layer) -> int:
-        """Put a layer in the place of the current one, return its id."""
-        self._layers[-1] = layer
-        return len(self._layers) - 1
-
-    def give(self, do: str, values: NDArray[Any]) -> None:
-        """Set points (``move``), a value a face (``set_scalar``) or a colour a face (``set_color``), in place."""
-        part = {"move": "points", "set_scalar": "face_scalar", "set_color": "face_color"}[do]
-        changed: dict[str, Any] = {part: values}
-        self._layers[-1] = replace(self._layers[-1], **changed)
-
-    @property
-    def layers(self) -> tuple[list[int], int | None]:
-        """Ids of all layers and of the current one."""
-        n = len(self._layers)
-        return list(range(n)), n - 1 if n else None
-
-
-@dataclass
-class State:
-    """What a script works on.
-
-    Parameters
-    ----------
-    meshes : Meshes
-        The layers.
-    image : path, array or LabelImage, optional
-        The picture as given.
-    folder : Path
-        Where the files of the script are.
-    """
-
-    meshes: Meshes
-    image: Any = None
-    folder: Path = field(default_factory=Path)
-    labels: LabelImage | None = None
-    pixel_boundary: BoundaryGraph | None = None
-    boundary: BoundaryGraph | None = None
-    made: dict[int, QuadMesh] = field(default_factory=dict)  # meshes of ours by the id of their layer
-
-    def need_image(self) -> Any:
-        """Return the picture: its path, or what it was read to."""
-        if self.image is None:
-            raise InputError("there is no picture; give one as input")
-        if isinstance(self.image, (str, Path)) and Path(self.image).suffix.lower() == ".vti":
-            self.image = read_vti(Path(self.image), ReadOptions.max_pixels)
-        return self.image
-
-    def need_labels(self) -> LabelImage:
-        """Return the labelled picture; the picture is segmented with the defaults where no filter has done it."""
-        if self.labels is None:
-            _segment(self, SegmentationOptions())
-        assert self.labels is not None
-        return self.labels
-
-    def need_pixel_boundary(self) -> BoundaryGraph:
-        """Return the pixel boundary, extracted with the defaults where no filter has done it."""
-        if self.pixel_boundary is None:
-            _extract(self, ExtractionOptions())
-        assert self.pixel_boundary is not None
-        return self.pixel_boundary
-
-    def put_labels(self, labels: LabelImage) -> None:
-        """Make another labelled picture the current one; boundaries of the former are dropped."""
-        self.labels, self.pixel_boundary, self.boundary = labels, None, None
-
-    def put_mesh(self, mesh: QuadMesh) -> None:
-        """Add a mesh as the current layer."""
-        self.made[self.meshes.add(quad_layer(mesh))] = mesh
-
-    def mesh(self) -> QuadMesh:
-        """Return the current layer as a mesh of quads.
-
-        A mesh made here keeps its regions and chains as long as MeshLab's filters leave its quads as they are.
-        """
-        _, current = self.meshes.layers
-        if current is None:
-            raise InputError("there is no mesh yet; make one, or give one as input")
-        layer = self.meshes.layer()
-        made = self.made.get(current)
-        if made is not None and np.array_equal(made.quads.ravel(), layer.face_points) and layer.n_faces == made.n_quads:
-            return _moved(made, layer)
-        return quad_mesh(layer, self.labels.materials if self.labels else None)
-
-
-def _moved(mesh: QuadMesh, layer: Layer) -> QuadMesh:
-    """Return a mesh with the points of its layer, where MeshLab may have moved them."""
-    if np.array_equal(mesh.points, layer.points[:, :2]) and not layer.points[:, 2].any():
-        return mesh
-    if np.ptp(layer.points[:, 2]) > 0.0 or quad_areas(layer.points, mesh.quads).sum() < 0.0:  # tilted or mirrored
-        return quad_mesh(layer, mesh.materials)
-    return replace(mesh, points=layer.points[:, :2])
+from imgquad_mesh.files import check_target, mesh_extensions, write_labels, write_mesh_file
+from imgquad_mesh.layer import polyline
+from imgquad_mesh.meshlab import face_materials, quad_layer
+from imgquad_mesh.state import State
 
 
 @dataclass(frozen=True)
@@ -188,7 +59,7 @@ class NoOptions:
 
 @dataclass(frozen=True)
 class MeshFileOptions:
-    """Where the mesh is written, the extension names the format, and which elements it is made of: see `ElementOptions`."""
+    """Where the mesh is written (the extension names the format), and of which elements: see `ElementOptions`."""
 
     file_name: str = "mesh.vtu"
     order: int = 1
@@ -219,6 +90,22 @@ def _segment(state: State, options: SegmentationOptions) -> dict[str, Any]:
     return {"note": found.note, **_label_counts(found.image)}
 
 
+def _labels(state: State) -> LabelImage:
+    """Return the labelled picture; the picture is segmented with the defaults where no filter has done it."""
+    if state.labels is None:
+        _segment(state, SegmentationOptions())
+    assert state.labels is not None
+    return state.labels
+
+
+def _pixel_boundary(state: State) -> BoundaryGraph:
+    """Return the pixel boundary, extracted with the defaults where no filter has done it."""
+    if state.pixel_boundary is None:
+        _extract(state, ExtractionOptions())
+    assert state.pixel_boundary is not None
+    return state.pixel_boundary
+
+
 def _label_counts(image: LabelImage) -> dict[str, Any]:
     numbers, counts = np.unique(image.labels, return_counts=True)
     pixels = {image.materials.name_of(int(n)): int(c) for n, c in zip(numbers, counts, strict=True) if n >= 0}
@@ -226,7 +113,7 @@ def _label_counts(image: LabelImage) -> dict[str, Any]:
 
 
 def _remove_noise(state: State, options: DenoiseOptions) -> dict[str, Any]:
-    before = state.need_labels()
+    before = _labels(state)
     after = remove_noise(before, options)
     state.put_labels(after)
     removed = list_removed(before, after)
@@ -234,39 +121,43 @@ def _remove_noise(state: State, options: DenoiseOptions) -> dict[str, Any]:
 
 
 def _crop(state: State, options: CropOptions) -> dict[str, Any]:
-    image = state.need_labels()
+    image = _labels(state)
     state.put_labels(crop_image(image, options.crop) if options.crop else image)
-    return {"rows": state.need_labels().shape[0], "columns": state.need_labels().shape[1]}
+    return {"rows": _labels(state).shape[0], "columns": _labels(state).shape[1]}
 
 
 def _drop(state: State, options: DropOptions) -> dict[str, Any]:
-    state.put_labels(drop_materials(state.need_labels(), options.drop))
-    return _label_counts(state.need_labels())
+    state.put_labels(drop_materials(_labels(state), options.drop))
+    return _label_counts(_labels(state))
 
 
 def _extract(state: State, options: ExtractionOptions) -> dict[str, Any]:
-    state.pixel_boundary, state.boundary = extract_boundaries(state.need_labels(), options), None
+    state.pixel_boundary, state.boundary = extract_boundaries(_labels(state), options), None
     return _put_boundary(state, state.pixel_boundary, "pixel boundary")
 
 
 def _smooth(state: State, options: SmoothingOptions) -> dict[str, Any]:
-    state.boundary = smooth_boundaries(state.need_pixel_boundary(), _numbered(options, state))
+    state.boundary = smooth_boundaries(_pixel_boundary(state), _numbered(options, state))
     return _put_boundary(state, state.boundary, "smoothed boundary")
 
 
-O = TypeVar("O", SmoothingOptions, MeshingOptions)
+Sized = TypeVar("Sized", SmoothingOptions, MeshingOptions)
 
 
-def _numbered(options: O, state: State) -> O:
+def _numbered(options: Sized, state: State) -> Sized:
     """Return the options with materials by number, which scripts may call by name."""
-    materials = state.need_labels().materials
+    materials = _labels(state).materials
     sizes = {material_number(materials, name): size for name, size in (options.material_sizes or {}).items()}
     return replace(options, material_sizes=sizes or None)
 
 
 def _put_boundary(state: State, graph: BoundaryGraph, label: str) -> dict[str, Any]:
     state.meshes.add(polyline(graph.points, graph.segments, label=label))
-    return {"chains_number": graph.n_chains, "regions_number": len(graph.region_label), "points_number": len(graph.points)}
+    return {
+        "chains_number": graph.n_chains,
+        "regions_number": len(graph.region_label),
+        "points_number": len(graph.points),
+    }
 
 
 def _mesh_boundary(state: State, options: MeshingOptions) -> dict[str, Any]:
@@ -274,7 +165,7 @@ def _mesh_boundary(state: State, options: MeshingOptions) -> dict[str, Any]:
         smoothing = SmoothingOptions(size=options.size, growth=options.growth, material_sizes=options.material_sizes)
         _smooth(state, smoothing)
     assert state.boundary is not None
-    mesh = mesh_boundaries(state.boundary, _numbered(options, state), state.need_labels().materials)
+    mesh = mesh_boundaries(state.boundary, _numbered(options, state), _labels(state).materials)
     state.put_mesh(mesh)
     return _size_of(mesh)
 
@@ -369,7 +260,7 @@ def _save_mesh(state: State, options: MeshFileOptions) -> dict[str, Any]:
 
 def _save_labels(state: State, options: LabelFileOptions) -> dict[str, Any]:
     path = script_path(options.file_name, state.folder)
-    write_labels(state.need_labels(), path)
+    write_labels(_labels(state), path)
     return {"file": str(path)}
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from imgquad_core.errors import InputError
-
 from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, script_text
 from imgquad_mesh.names import nearest
 from imgquad_mesh.spec import Filter, Parameter, Value, filters, find_filter
@@ -98,8 +97,12 @@ def _markdown(spec: Filter) -> Iterator[str]:
 def _kind(parameter: Parameter) -> str:
     if parameter.choices:
         return ", ".join(f"{n} {choice}" for n, choice in enumerate(parameter.choices))
-    limits = f" {parameter.low:g} to {parameter.high:g}" if parameter.low is not None and parameter.high is not None else ""
-    return {"Boolean": "true or false", "Int": "whole number", "Real": "number", "String": "text"}[parameter.kind] + limits
+    limits = (
+        f" {parameter.low:g} to {parameter.high:g}" if parameter.low is not None and parameter.high is not None else ""
+    )
+    return {"Boolean": "true or false", "Int": "whole number", "Real": "number", "String": "text"}[
+        parameter.kind
+    ] + limits
 
 
 def _shown(value: Value) -> str:

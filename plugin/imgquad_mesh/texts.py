@@ -10,7 +10,6 @@ from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
 
 from imgquad_core.errors import InputError
-
 from imgquad_mesh.cli import fe as elements
 from imgquad_mesh.cli import options as command
 from imgquad_mesh.spec import Filter, Value
@@ -51,15 +50,18 @@ def _write_sizes(sizes: Mapping[Any, float] | None) -> str:
 
 
 def _cohesive(text: str) -> str | tuple[tuple[str, str], ...] | None:
-    pairs = [elements.pair(item) for item in _items(text)]
-    return "all" if "all" in pairs else tuple(pairs) or None  # type: ignore[return-value]
+    read = [elements.pair(item) for item in _items(text)]
+    pairs = tuple(pair for pair in read if not isinstance(pair, str))
+    return "all" if "all" in read else pairs or None
 
 
 def _write_cohesive(pairs: Any) -> str:
     return pairs if isinstance(pairs, str) else _joined(f"{a}:{b}" for a, b in pairs or ())
 
 
-_LENGTH_OR_AUTO = Text(lambda text: None if text == "auto" else command.number(text), lambda v: "auto" if v is None else repr(v))
+_LENGTH_OR_AUTO = Text(
+    lambda text: None if text == "auto" else command.number(text), lambda v: "auto" if v is None else repr(v)
+)
 
 #: by name of the field
 TEXTS: Mapping[str, Text] = {
@@ -110,7 +112,7 @@ def _read(name: str, field: str, text: Value) -> Any:
 
 
 def values_of(options: Any, spec: Filter) -> dict[str, Value]:
-    """Return the value of each parameter of a filter that options stand for, by field name: `options_from` turned round."""
+    """Return the values of a filter's parameters, by field name, that give these options in `options_from`."""
     values: dict[str, Value] = {}
     for option in fields(options):
         parameter = spec.parameter(option.name)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from imgquad_core.errors import QualityError
 from imgquad_core.model import Materials, QuadMesh
 from imgquad_core.pipeline import MeshOptions, mesh_image
@@ -43,7 +44,9 @@ def wobbly_grid(n: int, hole: bool = False) -> QuadMesh:
     material = np.where((abs(col - n / 2) < n / 6) & (abs(row - n / 2) < n / 6), 7, np.where(col < n / 2, 1, 3))
     if hole:
         a, b = n // 4, n // 2
-        keep = ~((col >= a) & (col < b) & (row >= a) & (row < b)) & ~((col >= b) & (col < b + a) & (row >= b) & (row < b + a))
+        keep = ~((col >= a) & (col < b) & (row >= a) & (row < b)) & ~(
+            (col >= b) & (col < b + a) & (row >= b) & (row < b + a)
+        )
         quads, material = quads[keep], material[keep]
     used, corners = np.unique(quads, return_inverse=True)
     materials = Materials(np.array([1, 3, 7]), ("a", "b", "c"), np.array([[10, 0, 0], [20, 0, 0], [200, 1, 2]]))

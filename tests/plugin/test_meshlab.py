@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
+
 from imgquad_core.errors import InputError
 from imgquad_core.model import Materials
 from imgquad_core.pipeline import MeshOptions, mesh_image

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from imgquad_core.errors import ScriptError
 from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, read_script, script_text
 from imgquad_mesh.names import meshlab_function, nearest
@@ -72,7 +73,9 @@ def test_attributes_stand_in_any_order_and_unknown_ones_are_ignored(tmp_path: Pa
 
 
 def test_open_file_needs_its_extensions(tmp_path: Path) -> None:
-    text = '<FilterScript><filter name="F"><Param name="f" type="RichOpenFile" value="a.ply" {}/></filter></FilterScript>'
+    text = (
+        '<FilterScript><filter name="F"><Param name="f" type="RichOpenFile" value="a.ply" {}/></filter></FilterScript>'
+    )
     (tmp_path / "good.mlx").write_text(text.format('exts_cardinality="1" ext_val0="*.ply"'))
     assert read_script(tmp_path / "good.mlx").filters[0].parameters[0].value == "a.ply"
     (tmp_path / "bad.mlx").write_text(text.format(""))
@@ -89,7 +92,10 @@ def test_missing_script_is_named(tmp_path: Path) -> None:
     ("display", "python"),
     [
         ("Subdivision Surfaces: Loop", "subdivision_surfaces_loop"),
-        ("Transfer: Vertex Attributes to Texture (1 or 2 meshes)", "transfer_vertex_attributes_to_texture_1_or_2_meshes"),
+        (
+            "Transfer: Vertex Attributes to Texture (1 or 2 meshes)",
+            "transfer_vertex_attributes_to_texture_1_or_2_meshes",
+        ),
         ("Re-Orient all faces coherently", "re_orient_all_faces_coherently"),
         ("stepSmoothNum", "stepsmoothnum"),
         ("lambda", "lambda_"),
@@ -110,5 +116,7 @@ def test_names_that_keys_txt_has_wrong_are_set_right() -> None:
 
 
 def test_nearest_name_is_suggested_and_a_far_one_is_not() -> None:
-    assert nearest("Image to Quat Mesh", ["Image to Quad Mesh", "Image: Crop"]) == "; did you mean 'Image to Quad Mesh'?"
+    assert (
+        nearest("Image to Quat Mesh", ["Image to Quad Mesh", "Image: Crop"]) == "; did you mean 'Image to Quad Mesh'?"
+    )
     assert nearest("zzz", ["Image to Quad Mesh"]) == ""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from imgquad_core.errors import InputError
 from imgquad_mesh.spec import Filter, filters, filters_file, find_filter, python_name, read_filters
 from imgquad_mesh.steps import STEPS
@@ -118,11 +119,14 @@ def test_parameters_and_defaults_are_those_of_the_options(function: str) -> None
 
 def test_a_default_changed_in_filters_xml_only_is_found(tmp_path: Path) -> None:
     for was, is_now, name in [
-        ('parName="maxShift" parType="Real" parDefault="1"', 'parName="maxShift" parType="Real" parDefault="1.5"', "max_shift"),
-        ("parName=\"boundarySize\" parType=\"String\" parDefault=\"'auto'\"",
-         "parName=\"boundarySize\" parType=\"String\" parDefault=\"'2'\"", "boundary_size"),
+        ('"maxShift" parType="Real" parDefault="1"', '"maxShift" parType="Real" parDefault="1.5"', "max_shift"),
+        (
+            'parName="boundarySize" parType="String" parDefault="\'auto\'"',
+            'parName="boundarySize" parType="String" parDefault="\'2\'"',
+            "boundary_size",
+        ),
         ('parDefault="false"', 'parDefault="true"', "drop_transparent"),
-    ]:  # fmt: skip
+    ]:
         assert was in XML
         (tmp_path / "filters.xml").write_text(XML.replace(was, is_now), encoding="utf-8")
         changed = read_filters(tmp_path / "filters.xml")
@@ -172,9 +176,14 @@ def test_limits_and_choices_are_those_of_the_options(function: str) -> None:
 def test_texts_are_read_and_written_back() -> None:
     spec, options = filters()["generate_quad_mesh_from_image"], STEPS["generate_quad_mesh_from_image"].options
     values = {
-        "colors": "#ff0000,#00ff0a", "min_pixels": "12", "min_length": "7.25", "boundary_size": "1.3",
-        "material_sizes": 'quartz=2.5,"a, b=1"', "drop": 'pore,"a, b"', "crop": "1,2,30,40",
-    }  # fmt: skip
+        "colors": "#ff0000,#00ff0a",
+        "min_pixels": "12",
+        "min_length": "7.25",
+        "boundary_size": "1.3",
+        "material_sizes": 'quartz=2.5,"a, b=1"',
+        "drop": 'pore,"a, b"',
+        "crop": "1,2,30,40",
+    }
     made = options_from(options, spec, values)
     assert made.colors == [(255, 0, 0), (0, 255, 10)]
     assert (made.min_pixels, made.min_length, made.boundary_size) == (12, 7.25, 1.3)
@@ -186,9 +195,19 @@ def test_texts_are_read_and_written_back() -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("colors", "many"), ("min_pixels", "-3"), ("min_pixels", "x"), ("boundary_size", "wide"), ("boundary_size", "-1"),
-     ("material_sizes", "quartz"), ("material_sizes", "quartz=x"), ("crop", "1,2,3"), ("size", 0.0), ("size", -1.0)],
-)  # fmt: skip
+    [
+        ("colors", "many"),
+        ("min_pixels", "-3"),
+        ("min_pixels", "x"),
+        ("boundary_size", "wide"),
+        ("boundary_size", "-1"),
+        ("material_sizes", "quartz"),
+        ("material_sizes", "quartz=x"),
+        ("crop", "1,2,3"),
+        ("size", 0.0),
+        ("size", -1.0),
+    ],
+)
 def test_texts_and_values_that_mean_nothing_are_refused(name: str, value: Any) -> None:
     spec, options = filters()["generate_quad_mesh_from_image"], STEPS["generate_quad_mesh_from_image"].options
     with pytest.raises(InputError):

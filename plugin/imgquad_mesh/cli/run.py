@@ -78,9 +78,7 @@ class Writing:
 
 def execute(args: argparse.Namespace) -> int:
     """Mesh the picture that `args` names; return the exit code."""
-    outputs = Outputs(
-        args.output, args.labels_out, args.boundaries_out, args.report, args.picture, args.save_script
-    )
+    outputs = Outputs(args.output, args.labels_out, args.boundaries_out, args.report, args.picture, args.save_script)
     writing = Writing(element_options(args), writer_options(args))
     return mesh_to_files(
         args.image,
