@@ -356,6 +356,11 @@ def _node_pairs(mesh: FEMesh, low: str, high: str, along: int) -> Ints:
     near = 1e-9 * float(np.ptp(mesh.points, axis=0).max())
     a, b = (_sorted_along(mesh, mesh.node_sets[name], along, near) for name in (low, high))
     if not any(name.startswith("free_") for name in mesh.side_sets):
+        if len(a) != len(b) and len(mesh.cohesive):
+            raise InputError(
+                f"periodic: {len(a)} nodes on the {low} border, {len(b)} on the {high} border: split interfaces meet "
+                "them at different places; leave out the cohesive elements, or use a picture that repeats itself"
+            )
         if len(a) != len(b):
             raise TopologyError(f"periodic: {len(a)} nodes on the {low} border, {len(b)} on the {high} border")
     else:

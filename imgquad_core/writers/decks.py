@@ -46,7 +46,7 @@ def deck_text(
                 f'give them in a TOML file of properties below [{name}] or ["*"]'
             )
     if mesh.periodic:
-        return periodic_deck(mesh, deck)
+        return periodic_deck(mesh, deck, nodes)
     for border in ("left", "right"):
         if border not in mesh.node_sets:
             raise InputError(f"the deck '{deck}' needs the {border} border, but no element lies on it")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import count
 
 import numpy as np
 
@@ -46,6 +47,7 @@ def interface_text(
     if interfaces not in INTERFACES:
         raise InputError(f"interfaces = '{interfaces}' is unknown; choose one of: {', '.join(INTERFACES)}")
     names = mesh.material_names()
+    numbers = count(mesh.n_cells + len(mesh.cohesive) + 1)  # of springs
     for name, ids in mesh.cohesive_cells().items():
         a, b = (names[int(m)] for m in mesh.cohesive_pair[ids[0]])
         stiffness = interface_values(values, a, b)
@@ -58,7 +60,7 @@ def interface_text(
                     f'springs need {" and ".join(missing)} of the interface; give them below ["{a}:{b}"] or ["*:*"] '
                     "in the TOML file of properties"
                 )
-            yield from _springs(mesh, ids, labels[name], stiffness, thickness)
+            yield from _springs(mesh, ids, labels[name], stiffness, thickness, numbers)
 
 
 def _elements(mesh: FEMesh, ids: Ints, label: str, stiffness: Mapping[str, float], thickness: float) -> Iterator[str]:
@@ -77,7 +79,9 @@ def _elements(mesh: FEMesh, ids: Ints, label: str, stiffness: Mapping[str, float
         yield "** no values were given: put *ELASTIC, TYPE=TRACTION and *DAMAGE here\n"
 
 
-def _springs(mesh: FEMesh, ids: Ints, label: str, stiffness: Mapping[str, float], thickness: float) -> Iterator[str]:
+def _springs(
+    mesh: FEMesh, ids: Ints, label: str, stiffness: Mapping[str, float], thickness: float, numbers: Iterator[int]
+) -> Iterator[str]:
     """SPRING2 elements between the two nodes at each place, with the stiffness of its share of the interface.
 
     Where the normal and the shear stiffness differ, each place has axes of its own along its normal.
@@ -85,15 +89,13 @@ def _springs(mesh: FEMesh, ids: Ints, label: str, stiffness: Mapping[str, float]
     pairs, normals = node_pairs(mesh, ids)
     share = np.linalg.norm(normals, axis=1) * (thickness if mesh.dimension == 2 else 1.0)
     same = stiffness["normal_stiffness"] == stiffness["shear_stiffness"]
-    number = mesh.n_cells + len(mesh.cohesive) + mesh.dimension * int(ids[0]) * len(SHARES[mesh.cohesive.shape[1]])
     for at, (pair, size, normal) in enumerate(zip(pairs + 1, share.tolist(), normals, strict=True)):
         axes = "" if same else f", ORIENTATION=O_{label}_{at + 1}"
         if not same:
             yield f"*ORIENTATION, NAME=O_{label}_{at + 1}, SYSTEM=RECTANGULAR\n{_axes(normal)}\n"
         for direction in range(1, mesh.dimension + 1):
-            number += 1
             value = stiffness["normal_stiffness" if direction == 1 else "shear_stiffness"] * size
-            yield f"*ELEMENT, TYPE=SPRING2, ELSET={label}_{at + 1}_{direction}\n{number}, {pair[0]}, {pair[1]}\n"
+            yield f"*ELEMENT, TYPE=SPRING2, ELSET={label}_{at + 1}_{direction}\n{next(numbers)}, {pair[0]}, {pair[1]}\n"
             yield f"*SPRING, ELSET={label}_{at + 1}_{direction}{axes}\n{direction}, {direction}\n{value:.12g}\n"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -60,8 +60,12 @@ def _ties(mesh: FEMesh) -> dict[int, tuple[int, str]]:
     return ties
 
 
-def periodic_deck(mesh: FEMesh, deck: str) -> Iterator[str]:
+def periodic_deck(mesh: FEMesh, deck: str, nodes: Mapping[str, str]) -> Iterator[str]:
     """Text of a step that drives a periodic cell: a mean strain, or a mean gradient of temperature, along x.
+
+    Notes
+    -----
+    What is printed is the force (heat) over the right side: CalculiX has none at a driver, which has no element.
 
     Raises
     ------
@@ -77,11 +81,11 @@ def periodic_deck(mesh: FEMesh, deck: str) -> Iterator[str]:
         yield f"*INITIAL CONDITIONS, TYPE=TEMPERATURE\nNALL, 0.\n*BOUNDARY\n{first}, 11, 11, 0.\n"
         yield from (f"{name}, 11, 11, {1.0 if d == 'x' else 0.0}\n" for d, name in names.items())
         yield "*STEP\n*HEAT TRANSFER, STEADY STATE\n1., 1.\n"
-        yield f"*NODE PRINT, NSET={names['x']}, TOTALS=ONLY\nRFL\n*NODE FILE\nNT, RFL\n*EL FILE\nHFL\n*END STEP\n"
+        yield f"*NODE PRINT, NSET={nodes['right']}, TOTALS=ONLY\nRFL\n*NODE FILE\nNT, RFL\n*EL FILE\nHFL\n*END STEP\n"
         return
     yield f"*BOUNDARY\n{first}, 1, {mesh.dimension}\n"
     yield f"{names['x']}, 2, {mesh.dimension}\n"
     if "y" in names:
         yield f"{names['y']}, 1, 1\n" + (f"{names['y']}, 3, 3\n" if mesh.dimension == 3 else "")
     yield f"*STEP\n*STATIC\n*BOUNDARY\n{names['x']}, 1, 1, {STRAIN * width:.12g}\n"
-    yield f"*NODE PRINT, NSET={names['x']}, TOTALS=ONLY\nRF\n*NODE FILE\nU, RF\n*EL FILE\nS, E\n*END STEP\n"
+    yield f"*NODE PRINT, NSET={nodes['right']}, TOTALS=ONLY\nRF\n*NODE FILE\nU, RF\n*EL FILE\nS, E\n*END STEP\n"

@@ -133,6 +133,19 @@ def test_abaqus_gets_coh2d4_with_its_section(tmp_path: Path) -> None:
     assert text.count("put *ELASTIC, TYPE=TRACTION") == 2
 
 
+def test_springs_of_many_interfaces_have_numbers_of_their_own(tmp_path: Path) -> None:
+    image = np.random.default_rng(1).integers(0, 5, (9, 9))
+    mesh = split_interfaces(fe_mesh(staircase(image, tuple("abcde"), jiggle)))
+    values = {"*:*": {"normal_stiffness": 5.0, "shear_stiffness": 2.0}}
+    write_mesh(mesh, tmp_path / "a.inp", properties=values, interfaces="springs")
+    lines = (tmp_path / "a.inp").read_text().splitlines()
+    at = [i for i, line in enumerate(lines) if line.startswith("*ELEMENT, TYPE=SPRING2")]
+    numbers = [int(lines[i + 1].split(",")[0]) for i in at]
+    sets = [lines[i].split("ELSET=")[1] for i in at]
+    assert min(numbers) > mesh.n_cells
+    assert len(set(numbers)) == len(set(sets)) == len(numbers) > 100
+
+
 def test_other_formats_take_them_as_blocks_or_say_no(tmp_path: Path) -> None:
     mesh = split_interfaces(three())
     pv = pytest.importorskip("pyvista")

@@ -15,10 +15,11 @@ from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.extrusion import extrude
 from imgquad_core.model import VOID
 from imgquad_core.periodic import with_periodic_pairs
-from imgquad_core.pipeline import MeshOptions, mesh_image
+from imgquad_core.pipeline import MeshOptions, mesh_image, run
 from imgquad_core.quality import scaled_jacobian
 from imgquad_core.second_order import second_order
 from imgquad_core.sets import fe_mesh
+from imgquad_core.smoothing import region_areas
 from imgquad_core.writers import write_mesh
 
 
@@ -43,16 +44,20 @@ def areas(mesh) -> NDArray[np.float64]:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("directions", ["x", "y", "xy"])
 def test_sides_match_and_areas_stay(seed: int, directions: str) -> None:
-    labels = wrapped_disks(seed)
-    mesh = mesh_image(labels, MeshOptions(size=4.0, periodic=directions))
+    labels = wrapped_disks(seed, 160, 25)
+    made = run(labels, MeshOptions(size=4.0, periodic=directions))
+    mesh = made.mesh
     tied = with_periodic_pairs(fe_mesh(mesh), directions)
     for direction, pairs in tied.periodic.items():
         axis = "xy".index(direction)
         step = tied.points[pairs[:, 1]] - tied.points[pairs[:, 0]]
-        assert (step[:, axis] == 96).all()
+        assert (step[:, axis] == 160).all()
         assert (step[:, 1 - axis] == 0).all()
     assert scaled_jacobian(mesh.points, mesh.quads).min() > 0.05
-    assert np.abs(areas(mesh) / np.bincount(labels.ravel()) - 1).max() < 1e-3
+    pixels = np.bincount(labels.ravel())
+    of_boundary = np.bincount(made.boundary.region_label, region_areas(made.boundary))
+    assert np.abs(of_boundary / pixels - 1).max() < 2e-4
+    assert np.abs(areas(mesh) / pixels - 1).max() < 1e-3  # the mesher may give up single points of boundaries
 
 
 def test_boundaries_of_a_periodic_picture_meet_at_the_seam() -> None:
@@ -89,6 +94,10 @@ def test_order_two_and_extrusion_carry_the_pairs() -> None:
 
 
 def test_sides_that_do_not_match_are_said() -> None:
+    across = np.zeros((20, 20), int)
+    across[8:12, :10] = 1  # an interface meets the left border, none the right one
+    with pytest.raises(InputError, match="split interfaces meet them at different places"):
+        with_periodic_pairs(split_interfaces(fe_mesh(staircase(across))), "x")
     plain = mesh_image(
         np.arange(60)[:, None].repeat(60, 1) * np.ones(60) > np.linspace(10, 45, 60), MeshOptions(size=4.0)
     )
@@ -120,6 +129,8 @@ def test_a_periodic_laminate_is_solved_exactly(tmp_path: Path, deck: str, order:
     load = 1e-3 if deck == "tension" else -1 / 60
     stress = found["stresses"][:, 2] if deck == "tension" else found["heat flux"][:, 2]
     assert np.abs(stress / (mean * load) - 1).max() < 1e-5
+    total = found["total force" if deck == "tension" else "total heat generation"].ravel()[0]
+    assert abs(total) == pytest.approx(abs(mean * load * 40), rel=1e-6)
 
 
 @needs_ccx
@@ -128,8 +139,10 @@ def test_the_seam_may_lie_anywhere(tmp_path: Path) -> None:
     labels = wrapped_disks(6, 64, 5) > 0
     found = []
     for shift in (0, 23):
-        mesh = fe_mesh(mesh_image(np.roll(labels, shift, axis=(0, 1)), MeshOptions(size=2.0, periodic="xy")))
+        picture = np.roll(labels, shift, axis=(0, 1))
+        mesh = second_order(fe_mesh(mesh_image(picture, MeshOptions(size=2.0, periodic="xy"))))
         table = {n: {"young": 1.0 + 9.0 * m, "poisson": 0.3} for m, n in mesh.material_names().items()}
         write_mesh(with_periodic_pairs(mesh, "xy"), tmp_path / "a.inp", properties=table, deck="tension")
         found.append(solve(tmp_path / "a.inp")["total force"][0, 0])
-    assert found[0] == pytest.approx(found[1], rel=2e-3)
+    assert found[0] == pytest.approx(found[1], rel=1e-2)
+    assert 1e-3 < found[0] / 64 < (1 + 9 * labels.mean()) * 1e-3
