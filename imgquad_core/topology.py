@@ -199,7 +199,7 @@ def _remesh_around(
     """Grow a cavity around node `seed` and remesh it; return whether that was done."""
     begin(cavity)
     add_ring(net, cavity, seed)
-    last_gain, last_size = 0, 0
+    last_gain, last_size = np.int64(0), np.int64(0)  # typed: a literal would compile the callee once more
     while settle(net, cavity, largest, FLAT):
         kind, gain = _choose(net, cavity, cut, last_gain, last_size)
         if kind != NONE:
