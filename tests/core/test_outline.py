@@ -1,0 +1,137 @@
+"""Coarse outlines of faces: every second or fourth point, and which faces stand the coarsest."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from faces import graph_of, polygon_graph, voronoi_graph
+from imgquad_core.model import VOID, BoundaryGraph, PointKind
+from imgquad_core.outline import chains_of, coarse_segments, halved, outline, wide_faces
+
+SQUARE = [[0, 0], [32, 0], [32, 32], [0, 32]]
+
+
+def everything(graph: BoundaryGraph) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return np.ones(graph.n_chains, bool)
+
+
+def split_square(edges: int, bulge: float = 0.0) -> BoundaryGraph:
+    """Two halves of a square; the chain between them goes up from (16, 0) to (16, 32), bulging to the right."""
+    s = np.arange(edges + 1)[:, None] / edges
+    middle = np.hstack([16 + bulge * np.sin(np.pi * s), 32 * s])
+    right, left = [[16, 0], [32, 0], [32, 32], [16, 32]], [[16, 32], [0, 32], [0, 0], [16, 0]]
+    ways = [np.vstack([np.linspace(a, b, 4, endpoint=False) for a, b in pairwise(way)]) for way in (right, left)]
+    points = np.vstack([*ways, middle[1:-1]])
+    chains = [[*range(13)], [*range(12, 24), 0], [0, *range(24, 23 + edges), 12]]
+    return graph_of(points, chains, [(1, VOID), (0, VOID), (0, 1)], (32, 32))
+
+
+@pytest.mark.parametrize("stride", [2, 4])
+def test_segments_span_stride_edges_and_know_their_middle(stride: int) -> None:
+    graph = halved(voronoi_graph(64, 3, 4.0, 0), np.ones(voronoi_graph(64, 3, 4.0, 0).n_chains, bool))
+    segments = coarse_segments(graph, everything(graph), stride)
+    expected = []
+    for c in range(graph.n_chains):
+        ids = graph.chain(c).tolist()
+        expected += [(ids[i], ids[i + stride], ids[i + stride // 2], c) for i in range(0, len(ids) - stride, stride)]
+    assert list(zip(*(a.tolist() for a in segments), strict=True)) == expected
+    assert len(expected) == len(graph.segments) // stride
+
+
+def test_segments_of_some_chains_only() -> None:
+    graph = voronoi_graph(64, 3, 4.0, 0)
+    chosen = everything(graph)
+    chosen[3:] = False
+    segments = coarse_segments(graph, chosen, 2)
+    assert np.unique(segments.chain).tolist() == [0, 1, 2]
+    none = coarse_segments(graph, ~everything(graph), 2)
+    assert len(none.tail) == 0
+
+
+def test_chains_of_a_face_are_those_that_name_it() -> None:
+    graph = voronoi_graph(64, 3, 4.0, 1)
+    for f in range(9):
+        flags = np.arange(9) == f
+        assert np.array_equal(chains_of(graph, flags), (graph.chain_regions == f).any(axis=1))
+    assert chains_of(graph, np.ones(9, bool)).all()
+    assert not chains_of(graph, np.zeros(9, bool)).any()
+
+
+def test_outline_keeps_ids_and_names_other_faces_void() -> None:
+    graph = voronoi_graph(64, 3, 4.0, 2)
+    chosen = np.arange(9) == 4
+    flat = outline(graph, chosen, 2)
+    assert np.array_equal(flat.points, graph.points[flat.ids])
+    assert (np.diff(flat.ids) > 0).all()
+    chains = np.flatnonzero(chains_of(graph, chosen))
+    even = np.unique(np.concatenate([graph.chain(c)[::2] for c in chains]))
+    assert np.array_equal(flat.ids, even)
+    table = flat.constraints
+    assert set(table.region.tolist()) == {4, VOID}
+    assert np.count_nonzero(table.region == 4) == len(flat.segments)
+    for tail, head in flat.segments:
+        at = np.arange(table.offsets[tail], table.offsets[tail + 1])
+        assert head in table.head[at]
+
+
+def test_wide_face_needs_width_and_multiples_of_four() -> None:
+    wide = polygon_graph(SQUARE, [16] * 4, (32, 32))
+    assert wide_faces(wide, 3.0).tolist() == [True]
+    assert wide_faces(wide, 30.0).tolist() == [False]
+    assert wide_faces(polygon_graph(SQUARE, [16, 16, 16, 14], (32, 32)), 3.0).tolist() == [False]
+    assert wide_faces(polygon_graph(SQUARE, [2] * 4, (32, 32)), 0.1).tolist() == [False]  # two segments only
+    narrow = polygon_graph([[0, 0], [32, 0], [32, 2], [0, 2]], [32, 4, 32, 4], (2, 32))
+    assert wide_faces(narrow, 3.0).tolist() == [False]
+
+
+@pytest.mark.parametrize(("edges", "expected"), [(16, True), (14, False)])
+def test_chain_of_other_lengths_bars_both_faces_beside_it(edges: int, expected: bool) -> None:
+    assert wide_faces(split_square(edges), 1.0).tolist() == [expected] * 2
+
+
+def test_chords_that_would_cross_bar_their_faces() -> None:
+    # an island within the bulge of the chain: on the other side of the chain's chords
+    bulging = split_square(8, 6.0)
+    assert wide_faces(bulging, 0.5).tolist() == [True, True]
+    island = np.array(
+        [[21.0, 16], [20.6, 16.7], [20, 17], [19.4, 16.7], [19, 16], [19.4, 15.3], [20, 15], [20.6, 15.3]]
+    )
+    n = len(bulging.points)
+    points = np.vstack([bulging.points, island + np.array([0.9, -0.7])])
+    chains = [bulging.chain(c).tolist() for c in range(3)] + [[*range(n, n + 8), n]]
+    regions = [*map(tuple, bulging.chain_regions.tolist()), (2, 0)]
+    graph = graph_of(points, chains, regions, (32, 32))
+    assert not wide_faces(graph, 0.5)[:2].any()
+
+
+def test_halved_chains_gain_mid_points_behind_all_others() -> None:
+    graph = voronoi_graph(64, 3, 4.0, 3)
+    chosen = everything(graph)
+    chosen[::2] = False
+    fine = halved(graph, chosen)
+    n = len(graph.points)
+    assert fine.points[:n].tobytes() == graph.points.tobytes()
+    assert np.array_equal(fine.chain_regions, graph.chain_regions)
+    for c in range(graph.n_chains):
+        old, new = graph.chain(c), fine.chain(c)
+        if not chosen[c]:
+            assert np.array_equal(old, new)
+            continue
+        assert np.array_equal(new[::2], old)
+        assert (new[1::2] >= n).all()
+        assert np.allclose(fine.points[new[1::2]], 0.5 * (graph.points[old[:-1]] + graph.points[old[1:]]))
+    added = fine.points[n:]
+    on_frame = ((added == 0) | (added == 64)).any(axis=1)
+    assert np.array_equal(fine.point_kind[n:], np.where(on_frame, PointKind.FRAME, PointKind.FREE))
+    assert on_frame.any()
+    assert len(np.unique(fine.chain_points)) == len(fine.points)
+
+
+def test_halving_nothing_changes_nothing() -> None:
+    graph = voronoi_graph(64, 3, 4.0, 3)
+    same = halved(graph, ~everything(graph))
+    assert same.points.tobytes() == graph.points.tobytes()
+    assert np.array_equal(same.chain_points, graph.chain_points)
