@@ -12,7 +12,7 @@ import numpy as np
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh, Ints
 from imgquad_core.properties import Properties, read_properties, values_of
-from imgquad_core.writers.common import rows, safe_names, wrapped, write_text
+from imgquad_core.writers.common import real, rows, safe_names, wrapped, write_text
 from imgquad_core.writers.decks import DECKS, deck_text
 from imgquad_core.writers.interfaces import interface_text
 from imgquad_core.writers.periodicity import driver_names, equation_text
@@ -159,12 +159,12 @@ def _sections(mesh: FEMesh, labels: Labels, values: Properties, thickness: float
         yield from _material(values_of(values, name))
         yield f"*SOLID SECTION, ELSET={label}, MATERIAL={label}\n"
         if mesh.dimension == 2:
-            yield f"{thickness:.12g}\n"
+            yield f"{real(thickness)}\n"
 
 
 def _material(values: Mapping[str, float]) -> Iterator[str]:
     if "young" in values:
-        yield f"*ELASTIC\n{values['young']:.12g}, {values.get('poisson', 0.0):.12g}\n"
+        yield f"*ELASTIC\n{real(values['young'])}, {real(values.get('poisson', 0.0))}\n"
     for key, keyword in (
         ("conductivity", "CONDUCTIVITY"),
         ("density", "DENSITY"),
@@ -172,6 +172,6 @@ def _material(values: Mapping[str, float]) -> Iterator[str]:
         ("expansion", "EXPANSION"),
     ):
         if key in values:
-            yield f"*{keyword}\n{values[key]:.12g}\n"
+            yield f"*{keyword}\n{real(values[key])}\n"
     if not values:
         yield "** no values were given: put *ELASTIC or *CONDUCTIVITY here\n"

@@ -59,6 +59,12 @@ def _as_lists(array: np.ndarray[Any, Any]) -> list[list[Any]]:
     return [array.tolist()] if array.ndim == 1 else array.T.tolist()
 
 
+def real(value: float) -> str:
+    """Format a real with a point or an exponent; CalculiX takes some reals without one for whole numbers."""
+    text = f"{value:.12g}"
+    return text if "." in text or "e" in text else text + "."
+
+
 def wrapped(ids: ArrayLike, per_line: int, separator: str = ", ") -> Iterator[str]:
     """Yield numbers, `per_line` to a line."""
     values = list(map(str, np.asarray(ids).tolist()))

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import KINDS, FEMesh, Ints
 from imgquad_core.properties import Properties, values_of
+from imgquad_core.writers.common import real
 from imgquad_core.writers.periodicity import STRAIN, periodic_deck
 
 #: what each deck needs of every material
@@ -59,7 +60,7 @@ def _tension(mesh: FEMesh, nodes: Mapping[str, str]) -> Iterator[str]:
     for node, directions in _supports(mesh):
         yield from (f"{node + 1}, {d}, {d}\n" for d in directions)
     yield "*STEP\n*STATIC\n*BOUNDARY\n"
-    yield f"{nodes['right']}, 1, 1, {STRAIN * float(x.max() - x.min()):.12g}\n"
+    yield f"{nodes['right']}, 1, 1, {real(STRAIN * float(x.max() - x.min()))}\n"
     yield f"*NODE PRINT, NSET={nodes['right']}, TOTALS=ONLY\nRF\n"
     yield "*NODE FILE\nU, RF\n*EL FILE\nS, E\n*END STEP\n"
 

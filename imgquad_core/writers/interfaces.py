@@ -10,7 +10,7 @@ import numpy as np
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh, Floats, Ints
 from imgquad_core.properties import Properties, interface_values
-from imgquad_core.writers.common import rows
+from imgquad_core.writers.common import real, rows
 
 ELEMENTS = {4: "COH2D4", 8: "COH3D8"}
 INTERFACES = ("elements", "springs")
@@ -70,11 +70,11 @@ def _elements(mesh: FEMesh, ids: Ints, label: str, stiffness: Mapping[str, float
     yield f"*ELEMENT, TYPE={ELEMENTS[n_nodes]}, ELSET={label}\n"
     yield from rows("%d" + ", %d" * n_nodes + "\n", mesh.n_cells + 1 + ids, mesh.cohesive[ids] + 1)
     yield f"*COHESIVE SECTION, ELSET={label}, MATERIAL={label}, RESPONSE=TRACTION SEPARATION, THICKNESS=SPECIFIED\n"
-    yield f"1., {thickness:.12g}\n" if n_nodes == 4 else "1.\n"
+    yield f"1., {real(thickness)}\n" if n_nodes == 4 else "1.\n"
     yield f"*MATERIAL, NAME={label}\n"
     if all(key in stiffness for key in STIFFNESS):
         normal, shear = (stiffness[key] for key in STIFFNESS)
-        yield f"*ELASTIC, TYPE=TRACTION\n{normal:.12g}, {shear:.12g}, {shear:.12g}\n"
+        yield f"*ELASTIC, TYPE=TRACTION\n{real(normal)}, {real(shear)}, {real(shear)}\n"
     else:
         yield "** no values were given: put *ELASTIC, TYPE=TRACTION and *DAMAGE here\n"
 
@@ -96,13 +96,13 @@ def _springs(
         for direction in range(1, mesh.dimension + 1):
             value = stiffness["normal_stiffness" if direction == 1 else "shear_stiffness"] * size
             yield f"*ELEMENT, TYPE=SPRING2, ELSET={label}_{at + 1}_{direction}\n{next(numbers)}, {pair[0]}, {pair[1]}\n"
-            yield f"*SPRING, ELSET={label}_{at + 1}_{direction}{axes}\n{direction}, {direction}\n{value:.12g}\n"
+            yield f"*SPRING, ELSET={label}_{at + 1}_{direction}{axes}\n{direction}, {direction}\n{real(value)}\n"
 
 
 def _axes(normal: Floats) -> str:
     """First axis along `normal`, second in the plane across it."""
     x, y = (normal[:2] / np.linalg.norm(normal)).tolist()
-    return f"{x:.12g}, {y:.12g}, 0., {-y:.12g}, {x:.12g}, 0."
+    return f"{real(x)}, {real(y)}, 0., {real(-y)}, {real(x)}, 0."
 
 
 def node_pairs(mesh: FEMesh, ids: Ints) -> tuple[Ints, Floats]:

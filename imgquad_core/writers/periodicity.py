@@ -8,6 +8,7 @@ import numpy as np
 
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh
+from imgquad_core.writers.common import real
 
 STRAIN = 1e-3  #: mean strain of the tension deck
 TEMPERATURE = 11  #: its degree of freedom
@@ -35,7 +36,7 @@ def equation_text(mesh: FEMesh, heat: bool) -> Iterator[str]:
     drivers = {direction: mesh.n_points + 1 + i for i, direction in enumerate(mesh.periodic)}
     far = mesh.points.max(axis=0)
     for direction, number in drivers.items():
-        yield f"*NODE, NSET={driver_names(mesh)[direction]}\n{number}, " + ", ".join(f"{v:.12g}" for v in far) + "\n"
+        yield f"*NODE, NSET={driver_names(mesh)[direction]}\n{number}, " + ", ".join(map(real, far)) + "\n"
     for slave, (master, directions) in sorted(_ties(mesh).items()):
         terms = [slave + 1, master + 1, *(drivers[d] for d in directions)]
         for dof in (TEMPERATURE,) if heat else range(1, mesh.dimension + 1):
@@ -87,5 +88,5 @@ def periodic_deck(mesh: FEMesh, deck: str, nodes: Mapping[str, str]) -> Iterator
     yield f"{names['x']}, 2, {mesh.dimension}\n"
     if "y" in names:
         yield f"{names['y']}, 1, 1\n" + (f"{names['y']}, 3, 3\n" if mesh.dimension == 3 else "")
-    yield f"*STEP\n*STATIC\n*BOUNDARY\n{names['x']}, 1, 1, {STRAIN * width:.12g}\n"
+    yield f"*STEP\n*STATIC\n*BOUNDARY\n{names['x']}, 1, 1, {real(STRAIN * width)}\n"
     yield f"*NODE PRINT, NSET={nodes['right']}, TOTALS=ONLY\nRF\n*NODE FILE\nU, RF\n*EL FILE\nS, E\n*END STEP\n"

@@ -129,7 +129,7 @@ def test_abaqus_gets_coh2d4_with_its_section(tmp_path: Path) -> None:
     rows = np.array([line.split(", ") for line in block.splitlines()], int)
     of = mesh.cohesive_cells()["cohesive_air_clay"]
     assert (rows == np.column_stack([mesh.n_cells + 1 + of, mesh.cohesive[of] + 1])).all()
-    assert "*ELASTIC, TYPE=TRACTION\n5, 2, 2\n" in text
+    assert "*ELASTIC, TYPE=TRACTION\n5., 2., 2.\n" in text
     assert text.count("put *ELASTIC, TYPE=TRACTION") == 2
 
 

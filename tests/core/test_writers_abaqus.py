@@ -94,8 +94,8 @@ def test_properties_from_toml(tmp_path: Path) -> None:
     toml.write_text('["*"]\nyoung = 2e9\npoisson = 0.25\n["Ein Kreis!"]\nyoung = 1e9\n')
     write_mesh(MESH, tmp_path / "a.inp", properties=toml)
     text = (tmp_path / "a.inp").read_text()
-    assert "*MATERIAL, NAME=MATRIX\n*ELASTIC\n2000000000, 0.25\n" in text
-    assert "*MATERIAL, NAME=EIN_KREIS\n*ELASTIC\n1000000000, 0.25\n" in text
+    assert "*MATERIAL, NAME=MATRIX\n*ELASTIC\n2000000000., 0.25\n" in text
+    assert "*MATERIAL, NAME=EIN_KREIS\n*ELASTIC\n1000000000., 0.25\n" in text
     toml.write_text("young = 3\n")
     with pytest.raises(InputError, match="outside a table"):
         write_mesh(MESH, tmp_path / "a.inp", properties=toml)

@@ -43,6 +43,13 @@ def test_a_bar_with_an_interface_opens_as_springs_in_series(tmp_path: Path, orde
         assert np.abs(opening - [stress / 1000, 0]).max() < 1e-6 * stress / 1000
 
 
+def test_springs_may_be_stiffer_than_a_whole_number_is_large(tmp_path: Path) -> None:
+    values = {"*": {"young": 75e9, "poisson": 0.0}, "*:*": {"normal_stiffness": 3e12, "shear_stiffness": 1e12}}
+    write_mesh(split_interfaces(two_blocks(1)), tmp_path / "a.inp", properties=values, deck="tension")
+    force = solve(tmp_path / "a.inp")["total force"][0, 0]
+    assert force == pytest.approx(6 * 0.008 / (8 / 75e9 + 1 / 3e12), rel=1e-6)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_slanted_interface_is_stiff_along_its_own_axes(tmp_path: Path, order: int) -> None:
     mesh = two_blocks(order)
