@@ -16,7 +16,7 @@ _SIDE = 6.0  # px of arc of each side
 _SIDES = np.array([26.0, 18.0, 12.0, 8.5, _SIDE])  # what is tried to place a corner, as long as both are straight
 _NEAR = 0.4  # px beside the corner that are left out
 _STRAIGHT = 0.32  # px, largest residual (rms) of a side
-_TURN = 0.8  # radians, least turn between the sides
+_TURN, _TIP = 0.8, 2.5  # radians, least and largest turn between the sides; beyond it is the round tip of a line
 _UNLIKE = 0.20  # px, least residual of one quadratic through both sides
 _FARTHEST = 1.5  # px from the pixel boundary
 _APART = 4.2  # px of arc between corners
@@ -90,7 +90,7 @@ def _corner_at(curves: Curves, c: int, i: int, far: float) -> tuple[float, float
     n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, far)
     m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, far)
     turn = np.pi - abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
-    if n < 6 or m < 6 or max(rms_u, rms_v) > _STRAIGHT or turn < _TURN:
+    if n < 6 or m < 6 or max(rms_u, rms_v) > _STRAIGHT or not _TURN <= turn <= _TIP:
         return 0.0, 0.0, 0.0
     t = ((bx - ax) * vy - (by - ay) * vx) / (ux * vy - uy * vx)
     x, y = ax + t * ux, ay + t * uy

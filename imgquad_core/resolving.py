@@ -20,6 +20,7 @@ from imgquad_core.jit import kernel
 from imgquad_core.model import BoundaryGraph
 from imgquad_core.placement import even_out, place_nodes, points_at
 from imgquad_core.polylines import Level, Nodes, any_of_chain, level_of, mark_conflicts, number_nodes
+from imgquad_core.spacing import grade_chains
 
 _GENTLE_ROUNDS = 8  # that mind sectors and room; later ones only crossings
 _ROUNDS = 14  # until chains with crossings get their pixels back, and
@@ -29,6 +30,7 @@ _CLOSER, _LESS_CLOSE = 0.6, 0.8  # factors on the wanted length, at crossings an
 _CLOSEST = 0.25  # px between nodes, and no less
 _AREA_ROOM = 0.7  # of the bound of smoothing, for the shift that restores areas
 _AREA_ROUNDS = 10
+_KINK = 0.3  # shift for areas over the distance to the next node that stays
 
 
 class Draft(NamedTuple):
@@ -77,8 +79,10 @@ def place_freely(draft: Draft, size: Floats) -> tuple[Nodes, bool]:
         failed = any_of_chain(factor < 1.0, curves.offsets)
         if attempt >= _ROUNDS:
             exact |= failed | (attempt >= _ROUNDS + _LAST_ROUNDS)
-        size = np.maximum(size * factor, np.minimum(_CLOSEST, draft.limit))
-        withdrawn = np.where(per_point(curves, exact), 1.0, np.minimum(withdrawn + pull, 1.0))
+        shorter = np.maximum(size * factor, np.minimum(_CLOSEST, draft.limit))
+        shorter = grade_chains(shorter, curves, len(draft.node), draft.edge_ratio)
+        failed |= any_of_chain(shorter < size, curves.offsets)
+        size, withdrawn = shorter, np.where(per_point(curves, exact), 1.0, np.minimum(withdrawn + pull, 1.0))
         is_new = _with_neighbours(curves.ends, failed | exact, len(draft.node))
     raise TopologyError("chains of the pixel boundary itself cross or touch")
 
@@ -183,11 +187,25 @@ def _widened(flags: Flags) -> Flags:
 
 
 def _area_bounds(curves: Curves, nodes: Nodes, room: Floats, max_shift: float) -> Floats:
-    """How far each node may be shifted for areas."""
+    """How far each node may be shifted for areas: little beside nodes that stay, so that no kink arises."""
     offsets, at = nodes.placed.offsets, nodes.placed.at
     gone = np.hypot(*(nodes.points[nodes.chain_points] - points_at(curves.raw, at)).T)
     bound = np.minimum(max_shift - gone, _AREA_ROOM * room[at.astype(np.int64)])
-    bound[np.repeat(curves.is_frame, np.diff(offsets)) | nodes.placed.is_corner] = 0.0
+    stays = nodes.placed.is_corner | np.repeat(curves.is_frame, np.diff(offsets))
     is_open = curves.ends[:, 0] >= 0
-    bound[offsets[:-1][is_open]] = bound[offsets[1:][is_open] - 1] = 0.0
+    stays[offsets[:-1][is_open]] = stays[offsets[1:][is_open] - 1] = True
+    arc = curves.arc[at.astype(np.int64)] + (at % 1.0)
+    bound = np.minimum(bound, _KINK * _arc_to_next(arc, stays, offsets))
+    bound[stays] = 0.0
     return np.maximum(bound, 0.0)
+
+
+def _arc_to_next(arc: Floats, flags: Flags, offsets: Ints) -> Floats:
+    """Length along each chain to the nearest flagged place, infinite where there is none."""
+    place, last = np.arange(len(arc)), len(arc)
+    begin, end = np.repeat(offsets[:-1], np.diff(offsets)), np.repeat(offsets[1:], np.diff(offsets))
+    before = np.maximum.accumulate(np.where(flags, place, -1))
+    after = np.minimum.accumulate(np.where(flags, place, last)[::-1])[::-1]
+    back = np.where(before >= begin, arc - arc[before], np.inf)
+    ahead = np.where(after < end, arc[np.minimum(after, last - 1)] - arc, np.inf)
+    return np.minimum(back, ahead)

@@ -19,6 +19,7 @@ _FINEST_BEND = 1.0  # and where the curve only bends
 _ACROSS = 1.0  # edge length over local feature size: coarse segments are at most twice as long as the place is wide
 _BEND = 4.0  # arc over distance of a foreign point; chains that meet at more than 29 degrees do not count as thin
 _TURN = 0.55  # radians from one edge to the next
+_PAST_ENDS = 2  # ends of chains that a fine place reaches past
 _OVER = 2.0  # px of arc to each side over which the bend is measured
 
 
@@ -69,6 +70,19 @@ def grade(
     if size.min() < size.max():
         raster = np.full(shape, np.inf, np.float32)
         size = _grade_plane(size, points, slope, raster)
+    return grade_chains(size, curves, int(curves.ends.max(initial=-1)) + 1, edge_ratio)
+
+
+def grade_chains(size: Floats, curves: Curves, n_nodes: int, edge_ratio: float) -> Floats:
+    """Limit how fast `size` grows along the chains, and past their ends."""
+    is_open = curves.ends[:, 0] >= 0
+    node = curves.ends[is_open].ravel()
+    place = np.stack([curves.offsets[:-1], curves.offsets[1:] - 1], axis=1)[is_open].ravel()
+    for _ in range(_PAST_ENDS):
+        size = _grade_chains(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
+        least = np.full(n_nodes, np.inf)
+        np.minimum.at(least, node, size[place])
+        size[place] = least[node]
     return _grade_chains(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
 
 
