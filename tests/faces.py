@@ -69,7 +69,7 @@ def voronoi_graph(n: int, cells: int, size: float, seed: int, bend: float = 0.06
     Sides have edges of about `size`, a multiple of 4 where they are longer than six edges, else of 2.
     """
     rng = np.random.default_rng(seed)
-    seeds = (np.stack(np.mgrid[:cells, :cells], axis=-1).reshape(-1, 2) + rng.random((cells**2, 2))) * n / cells
+    seeds = (np.indices((cells, cells)).reshape(2, -1).T + rng.random((cells**2, 2))) * n / cells
     mirrored = [seeds, seeds * [-1, 1], seeds * [1, -1], [2 * n, 0] + seeds * [-1, 1], [0, 2 * n] + seeds * [1, -1]]
     diagram = Voronoi(np.vstack(mirrored))
     points: list[Points] = []

@@ -7,9 +7,10 @@ import threading
 import numpy as np
 import pytest
 
-from faces import FaceQuads, areas, assert_valid_faces, quads_of, voronoi_graph
+from faces import areas, assert_valid_faces, quads_of, voronoi_graph
 from imgquad_core import batches
 from imgquad_core.batches import faces_only, in_batches, joined, no_quads
+from imgquad_core.splitting import FaceQuads
 from imgquad_core.topology import CleanUp, clean_up
 
 

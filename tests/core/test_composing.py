@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import naive
-from faces import Points, areas, cut_of, graph_of, grid, polygon_graph, quads_of, voronoi_graph, with_layers
+from faces import Ids, Points, areas, cut_of, graph_of, grid, polygon_graph, quads_of, voronoi_graph, with_layers
 from imgquad_core.composing import WIDE_CORNER, WORST_PAIR, compose
 from imgquad_core.crossfield import CrossField, cross_field
 from imgquad_core.cutting import CutMesh, FaceConflict, cut_at_constraints
@@ -41,7 +41,7 @@ def field_on(graph: BoundaryGraph, size: float, growth: float = 0.3) -> tuple[Cu
     return cut, cross_field(cut, np.full(len(cut.points), size), growth)
 
 
-def edges_of(cut: CutMesh) -> tuple[Points, Points]:
+def edges_of(cut: CutMesh) -> tuple[Ids, Ids]:
     return cut.triangles.ravel(), np.roll(cut.triangles, -1, axis=1).ravel()
 
 
@@ -126,7 +126,7 @@ def test_spokes_begin_at_the_rim_edge_that_leaves() -> None:
         assert v in cut.triangles[spokes.triangle[v]]
 
 
-def pairs_of(cut: CutMesh, mate: Points) -> Points:
+def pairs_of(cut: CutMesh, mate: Ids) -> Ids:
     """Corners of each pair of triangles, counter-clockwise."""
     h = np.flatnonzero(mate >= 0)
     h = mate[h[mate[h] < cut.twins[mate[h]]]]
@@ -174,7 +174,7 @@ def test_no_two_single_triangles_could_be_a_square() -> None:
                 assert sines.min() <= WORST_PAIR or cut.on_rim[quad].any()
 
 
-def cut_of_triangles(points: Points, triangles: Points) -> CutMesh:
+def cut_of_triangles(points: Points, triangles: Ids) -> CutMesh:
     """Cut mesh of one face of just these triangles."""
     twins = naive.twins(triangles)
     rim = np.flatnonzero(twins == -1)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import naive
 import numpy as np
 import pytest
-from faces import grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+import naive
+from faces import grid
 from imgquad_core.halfedge import components, corners_at, twins_of
 
 Ids = NDArray[np.int64]

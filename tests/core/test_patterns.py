@@ -44,8 +44,8 @@ def canvas_on(points: Points) -> Canvas:
     """Empty canvas behind the nodes of an outline."""
     n = len(points)
     room = np.vstack([points, np.full((ROOM, 2), np.nan)])
-    lists = [np.full(ROOM, -1) for _ in range(4)]
-    return Canvas(room, n, np.full((ROOM, 4), -1), np.zeros(2, np.int64), *lists, np.empty((ROOM, 3)))
+    a, b, c, d = np.full((4, ROOM), -1)
+    return Canvas(room, n, np.full((ROOM, 4), -1), np.zeros(2, np.int64), a, b, c, d, np.empty((ROOM, 3)))
 
 
 def drawn(canvas: Canvas) -> tuple[Points, Ids]:

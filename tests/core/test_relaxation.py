@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import naive
-from faces import FaceQuads, Points, grid, quads_of, voronoi_graph
+from faces import Points, grid, quads_of, voronoi_graph
 from imgquad_core.quality import scaled_jacobian
 from imgquad_core.relaxation import (
     BAD,
@@ -27,6 +27,7 @@ from imgquad_core.relaxation import (
     untangle,
     worst_of_faces,
 )
+from imgquad_core.splitting import FaceQuads
 
 Move = Callable[[Points, Rings, Flags], object]
 MOVES: dict[str, Move] = {
@@ -102,6 +103,12 @@ def test_smoothing_brings_a_rough_grid_back() -> None:
     assert np.abs(points - grid(9, 8).points).max() < 0.1
 
 
+def corner_energy(corner: Points, which: int) -> tuple[float, ...]:
+    """Energy and derivatives of a corner (three points: itself, the next, the one before)."""
+    (px, py), (nx, ny), (bx, by) = corner.tolist()
+    return _corner_energy(px, py, nx, ny, bx, by, which)
+
+
 def test_derivatives_agree_with_finite_differences() -> None:
     rng = np.random.default_rng(3)
     step = 1e-4
@@ -112,14 +119,14 @@ def test_derivatives_agree_with_finite_differences() -> None:
             def energy(dx: float, dy: float, corner: Points = corner, which: int = which) -> float:
                 at = corner.copy()
                 at[which] += [dx, dy]
-                return float(_corner_energy(*at.ravel(), which)[0])
+                return float(corner_energy(at, which)[0])
 
             middle = energy(0, 0)
             (e, w), (n, s) = ((energy(step, 0), energy(-step, 0)), (energy(0, step), energy(0, -step)))
             gradient = [(e - w) / 2 / step, (n - s) / 2 / step]
             mixed = energy(step, step) - energy(step, -step) - energy(-step, step) + energy(-step, -step)
             hessian = [(e - 2 * middle + w) / step**2, mixed / 4 / step**2, (n - 2 * middle + s) / step**2]
-            found = _corner_energy(*corner.ravel(), which)
+            found = corner_energy(corner, which)
             scale = max(1.0, np.abs(found).max())
             assert found[1:3] == pytest.approx(gradient, abs=1e-5 * scale)
             assert found[3:] == pytest.approx(hessian, abs=1e-4 * scale)

@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 
 import naive
-from faces import FaceQuads, Ids, Points, areas, assert_valid_faces, grid, quads_of, rim_edges, voronoi_graph
+from faces import Ids, Points, areas, assert_valid_faces, grid, quads_of, rim_edges, voronoi_graph
 from imgquad_core.relaxation import laplace, rings_of
 from imgquad_core.repair import LEAST_GAIN, repair
+from imgquad_core.splitting import FaceQuads
 
 
 def rough_polygon(n: int, seed: int) -> Points:
     """Nodes around a rough circle, counter-clockwise."""
     rng = np.random.default_rng(seed)
     turn = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
-    return rng.uniform(0.8, 1.3, (n, 1)) * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    points: Points = rng.uniform(0.8, 1.3, (n, 1)) * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return points
 
 
 def only(points: Points, quads: Ids) -> FaceQuads:
@@ -94,8 +96,8 @@ def test_grains_lose_poor_quads_and_nothing_else(seed: int, below: float) -> Non
     assert worst(new) >= worst(old)
     assert rim_edges(new) == rim_edges(old)
     assert new.points[new.origin >= 0].tobytes() == old.points[old.origin >= 0].tobytes()
-    face_areas = [np.bincount(m.face, weights=areas(m.points, m.quads)) for m in (old, new)]
-    assert np.allclose(*face_areas)
+    before, after = (np.bincount(m.face, weights=areas(m.points, m.quads)) for m in (old, new))
+    assert np.allclose(before, after)
     poor = [np.count_nonzero(naive.corner_sines(m.points, m.quads).min(axis=1) < below) for m in (old, new)]
     assert poor[1] < poor[0] or (poor[0] == 0 and new is old)
     again = repair(old, below)

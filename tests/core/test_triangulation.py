@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import naive
 import numpy as np
 import pytest
-from faces import areas, polygon_graph, voronoi_graph
 from numpy.typing import NDArray
 
+import naive
+from faces import areas, polygon_graph, voronoi_graph
 from imgquad_core.errors import TopologyError
 from imgquad_core.triangulation import Triangles, constraint_table, triangulate
 
