@@ -26,6 +26,7 @@ REACH = 3.0  #: px, a boundary that meets opposite sides within this distance is
 TOUCHING = 1.0  #: px, ends of different boundaries this near take one place, too
 AREA_ROOM = 0.5  #: px, by which boundaries may move to keep areas
 RATIO, GROWTH = 1.6, 0.3  #: edges beside the border may be this much longer than its own, and grow so along the arc
+STEP = 2.5  #: ratio of neighbouring edges there; halving alone makes steps of two
 SLOPE = 0.25  #: by how much edges may grow per length of the side
 SAMPLE = 0.25  #: px, between places where the length of edges is looked at
 LEAST_GAP = 0.1  #: px, between neighbouring stations of one side that were moved
@@ -305,12 +306,11 @@ def _halved_near_ends(points: Floats, chain: Ints, finest: Floats, first_id: int
     longest = length.reshape(-1, 2).max(axis=1)
     begin, end = arc[:-1:2], arc[2::2]
     wanted = np.minimum(finest[0] + GROWTH * begin, finest[1] + GROWTH * (arc[-1] - end))
-    for _ in range(2):  # from one end, then from the other: edges grow by no more than RATIO
-        for k in range(1, len(wanted)):
-            parts = 2.0 ** np.ceil(np.log2(max(longest[k - 1] / (RATIO * wanted[k - 1]), 1.0)))
-            wanted[k] = min(wanted[k], longest[k - 1] / parts)
-        wanted, longest = wanted[::-1], longest[::-1]
     times = np.ceil(np.log2(np.maximum(longest / (RATIO * wanted), 1.0))).astype(np.int64)
+    for k in [*range(1, len(times)), *range(len(times) - 1, 0, -1)]:  # no edge far longer than its neighbours
+        for here, beside in ((k, k - 1), (k - 1, k)):
+            while longest[here] / 2 ** times[here] > STEP * longest[beside] / 2 ** times[beside]:
+                times[here] += 1
     parts = np.repeat(2**times, 2)
     edge = np.repeat(np.arange(len(length)), parts)
     share = (np.arange(len(edge)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[edge]
