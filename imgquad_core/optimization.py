@@ -16,7 +16,7 @@ from .errors import InputError
 from .frontal import wanted_quads
 from .halfedge import corners_at
 from .model import PointKind, QuadMesh
-from .quality import corner_angles, sectors_of
+from .quality import corner_angles, scaled_jacobian, sectors_of
 from .relaxation import BAD, GOOD, laplace, newton, rings_of, untangle, worst_of_faces
 from .splitting import INNER_VALENCE, FaceQuads
 from .topology import CleanUp, clean_up
@@ -115,7 +115,13 @@ def _is_better(old: FaceQuads, new: FaceQuads, n_faces: int) -> NDArray[np.bool_
     worst_old, worst_new = (worst_of_faces(m.points, m.quads, m.face, n_faces) for m in (old, new))
     odd_old, odd_new = _irregular(old, n_faces), _irregular(new, n_faces)
     fewer = (odd_new < odd_old) & (worst_new >= np.minimum(worst_old, GOOD_ENOUGH))
-    return np.asarray(fewer | ((odd_new <= odd_old) & (worst_new > worst_old)))
+    rounder = (worst_new == worst_old) & (_loss(new, n_faces) < _loss(old, n_faces))
+    return np.asarray(fewer | ((odd_new <= odd_old) & ((worst_new > worst_old) | rounder)))
+
+
+def _loss(mesh: FaceQuads, n_faces: int) -> NDArray[np.float64]:
+    """Return the sum of 1 - scaled Jacobian over the quads of each face."""
+    return np.asarray(np.bincount(mesh.face, 1.0 - scaled_jacobian(mesh.points, mesh.quads), n_faces), np.float64)
 
 
 def _irregular(mesh: FaceQuads, n_faces: int) -> Ids:

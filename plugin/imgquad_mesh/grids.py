@@ -11,6 +11,7 @@ from imgquad_core.model import QuadMesh
 from imgquad_mesh.convert import Placement
 from imgquad_mesh.writers import from_grid
 
+FIELDS = ("material_numbers", "material_names", "material_colors")
 FLAT = 1e-6  #: largest distance from the plane, relative to the extent
 
 
@@ -69,6 +70,11 @@ def flattened(grid: pv.UnstructuredGrid | pv.PolyData) -> tuple[NDArray[np.float
 def to_mesh(grid: pv.UnstructuredGrid | pv.PolyData) -> tuple[QuadMesh, Placement]:
     """Return the mesh of a grid, regions and boundaries found anew, and the plane that it lies in."""
     flat, plane = flattened(grid)
-    level = grid.copy(deep=False)
-    level.points = np.column_stack([flat, np.zeros(len(flat))])
+    # not a copy of the grid: setting the points of a shallow one moves the grid itself
+    level = pv.UnstructuredGrid({pv.CellType.QUAD: quads_of(grid)}, np.column_stack([flat, np.zeros(len(flat))]))
+    if "material" in grid.cell_data:
+        level.cell_data["material"] = grid.cell_data["material"]
+    for name in FIELDS:
+        if name in grid.field_data:
+            level.field_data[name] = grid.field_data[name]
     return from_grid(level), plane

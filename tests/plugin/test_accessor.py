@@ -1,91 +1,98 @@
-"""The accessor `.imgquad` on PyVista's images."""
+"""The accessor `.imgquad`: found by PyVista itself, on the datasets that need it, as cheap as it must be."""
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import pyvista as pv
 
-from imgquad_core.errors import InputError
+from imgquad_mesh import filters
+from pictures import point_image
 
 
-@pytest.fixture
-def disc() -> pv.ImageData:
-    image = pv.ImageData(dimensions=(60, 40, 1))
-    image["label"] = np.where(np.hypot(*(image.points[:, :2] - (25, 24)).T) < 11, 3, 1)
-    return image
+def test_methods_are_the_functions_with_their_help() -> None:
+    image = point_image()
+    assert image.imgquad.mesh.__doc__ == filters.mesh.__doc__
+    names = list(inspect.signature(filters.mesh).parameters)
+    assert list(inspect.signature(image.imgquad.mesh).parameters) == names[1:]
 
 
-def shoelace(grid: pv.UnstructuredGrid) -> np.ndarray:
-    p = grid.points[grid.cells_dict[pv.CellType.QUAD]][..., :2]
-    d, e = p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]
-    return (d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0]) / 2
+def test_every_filter_is_a_method_of_some_dataset() -> None:
+    kinds = (pv.ImageData, pv.PolyData, pv.UnstructuredGrid)
+    methods = {name for kind in kinds for name in dir(kind().imgquad) if not name.startswith("_")}
+    assert set(filters.__all__) - methods == {"boundaries_of_mesh"}  # that is `boundaries` of a grid
+    with pytest.raises(AttributeError):
+        pv.RectilinearGrid().imgquad  # noqa: B018
 
 
-def test_mesh_covers_the_cells_bounds_with_quads(disc: pv.ImageData) -> None:
-    grid = disc.imgquad.mesh(size=3)
-    assert set(grid.celltypes) == {pv.CellType.QUAD}
-    assert grid.bounds == pytest.approx(disc.points_to_cells("label").bounds)
-    assert shoelace(grid).min() > 0
-    assert grid.active_scalars_name == "material"
-    assert grid.cell_data["material"].dtype == np.int32
-    assert set(grid.cell_data["material"]) == {1, 3}
-    inside = grid.extract_cells(grid["material"] == 3)
-    assert inside.center == pytest.approx((25, 24, 0), abs=0.05)
-    assert grid.validate_mesh().is_valid
+@pytest.mark.parametrize("function", [getattr(filters, name) for name in filters.__all__])
+def test_conventions_of_pyvista(function: object) -> None:
+    """At most one argument after the dataset is positional; an image filter has `scalars=None`."""
+    parameters = list(inspect.signature(function).parameters.values())  # type: ignore[arg-type]
+    positional = [p for p in parameters[1:] if p.kind is p.POSITIONAL_OR_KEYWORD]
+    assert len(positional) <= 1
+    named = {p.name: p.default for p in parameters}
+    if parameters[0].name == "image":
+        assert named["scalars"] is None
+    if "progress_bar" in named:
+        assert named["progress_bar"] is False
+        assert parameters[-1].name == "progress_bar"
+    assert function.__doc__ is not None
+    for name in list(named)[1:]:
+        assert name in function.__doc__, f"{name} is not described"
 
 
-def test_names_and_colors_travel(disc: pv.ImageData) -> None:
-    grid = disc.imgquad.mesh()
-    assert grid.field_data["material_numbers"].tolist() == [1, 3]
-    assert len(grid.field_data["material_names"]) == 2
-    assert grid.field_data["material_colors"].shape == (2, 3)
-
-
-def test_input_is_untouched(disc: pv.ImageData) -> None:
-    before = disc.copy()
-    disc.imgquad.mesh(size=4)
-    assert disc == before
-    assert disc.active_scalars_name == before.active_scalars_name
-
-
-def test_cells_and_points_give_the_same_mesh(disc: pv.ImageData) -> None:
-    of_points, of_cells = disc.imgquad.mesh(), disc.points_to_cells("label").imgquad.mesh()
-    assert np.array_equal(of_points.points, of_cells.points)
-    assert np.array_equal(of_points.cells, of_cells.cells)
-
-
-def test_mirrored_image_keeps_quads_counter_clockwise(disc: pv.ImageData) -> None:
-    disc.direction_matrix = np.diag([-1.0, 1, 1])
-    grid = disc.imgquad.mesh()
-    assert shoelace(grid).min() > 0
-    assert grid.bounds == pytest.approx(disc.points_to_cells("label").bounds)
-
-
-def test_bad_size_is_a_value_error(disc: pv.ImageData) -> None:
-    with pytest.raises(ValueError, match="size is 0"):
-        disc.imgquad.mesh(size=0)
-    with pytest.raises(InputError, match="gold"):
-        disc.imgquad.mesh(material_sizes={"gold": 1})
-
-
-def test_nothing_heavy_is_loaded_before_the_first_mesh() -> None:
-    """PyVista finds the accessor by itself; registration costs under 50 ms and leaves Numba alone."""
+def test_nothing_heavy_is_loaded_before_the_first_filter() -> None:
+    """PyVista finds the accessor by itself; importing it costs under 50 ms and leaves Numba and the core alone."""
     script = """
 import sys, time
 import pyvista as pv
-image = pv.ImageData(dimensions=(4, 4, 1))
 start = time.perf_counter()
-image.imgquad
+import imgquad_mesh.accessor
 took = time.perf_counter() - start
+image = pv.ImageData(dimensions=(4, 4, 1))
+image.imgquad.mesh
 from imgquad_mesh.__main__ import build_parser
 build_parser().format_help()
 print(took, "numba" in sys.modules)
 """
-    out = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
-    seconds, numba_loaded = out.split()
-    assert numba_loaded == "False"
-    assert float(seconds) < 0.05
+    runs = [
+        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True) for _ in range(3)
+    ]
+    seconds, loaded = zip(*(run.stdout.split() for run in runs), strict=True)
+    assert set(loaded) == {"False"}
+    assert min(map(float, seconds)) < 0.05  # the machine may be busy with something else
+
+
+def test_only_pyvista_is_imported_by_the_user(tmp_path: Path) -> None:
+    script = """
+import pyvista as pv
+image = pv.ImageData(dimensions=(20, 20, 1))
+image["label"] = (image.points[:, 0] > 9).astype(int)
+mesh = image.imgquad.segment().imgquad.remove_noise().imgquad.boundaries().imgquad.smooth(3).imgquad.quads()
+print(mesh.n_cells, mesh.imgquad.quality()["scaled_jacobian"].min() > 0.5)
+"""
+    command = [sys.executable, "-W", "error", "-c", script]
+    out = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout.split()
+    assert int(out[0]) > 30
+    assert out[1] == "True"
+
+
+def test_an_older_pyvista_is_told_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(pv, "register_dataset_accessor")
+    monkeypatch.delitem(sys.modules, "imgquad_mesh.accessor")
+    with pytest.raises(ImportError, match=r"needs PyVista 0\.48 or newer.*pip install -U pyvista"):
+        import imgquad_mesh.accessor  # noqa: F401
+
+
+def test_accessor_follows_its_dataset() -> None:
+    image = point_image()
+    other = image.copy()
+    other["label"] = np.zeros(image.n_points, int)
+    assert len(np.unique(image.imgquad.mesh()["material"])) == 3
+    assert len(np.unique(other.imgquad.mesh()["material"])) == 1
