@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
+from imgquad_core.halfedge import twins_of
 from imgquad_mesh.convert import materials_of
+from imgquad_mesh.grids import flattened, quads_of
 from imgquad_mesh.picture import material_colors
 
 #: limits of the colour bar and colour map of each measure
@@ -17,7 +19,17 @@ MEASURES = {
     "max_angle": ((90.0, 180.0), "RdYlGn_r"),
     "aspect": ((1.0, 4.0), "RdYlGn_r"),
 }
-MOST_IN_LEGEND = 16
+MOST_IN_LEGEND = 20
+MARGIN = 1.06  # of the mesh's size
+ROOM = 0.2  # of the width that is left for the legend
+_BAR = {
+    "vertical": True,
+    "width": 0.04,
+    "position_x": 0.84,
+    "position_y": 0.05,
+    "title_font_size": 18,
+    "label_font_size": 14,
+}
 FEW, MANY = (0.85, 0.1, 0.1), (0.1, 0.2, 0.85)  #: colours of nodes with too few and too many quads
 
 
@@ -30,30 +42,38 @@ def add_to_plotter(
     **kwargs: Any,
 ) -> None:
     """Draw a mesh with its measures in a plotter, seen from its front."""
-    if scalars == "material":
-        _add_materials(plotter, grid, show_edges, **kwargs)
-    else:
-        limits, colors = MEASURES[scalars]
-        bar = {"title": scalars.replace("_", " "), "vertical": True, "height": 0.6, "width": 0.05}
-        bar |= {"position_x": 0.87, "position_y": 0.2, "title_font_size": 14, "label_font_size": 12, "fmt": "%.2g"}
-        defaults = {"clim": limits, "cmap": colors, "scalar_bar_args": bar}
-        plotter.add_mesh(grid, scalars=scalars, show_edges=show_edges, lighting=False, **(defaults | kwargs))
+    style = _material_style(grid) if scalars == "material" else _measure_style(grid, scalars)
+    plotter.add_mesh(**({"show_edges": show_edges, "lighting": False} | style | kwargs))
     if irregular:
         _mark_irregular(plotter, grid)
     look_at(plotter, grid)
 
 
-def _add_materials(plotter: Any, grid: pv.UnstructuredGrid | pv.PolyData, show_edges: bool, **kwargs: Any) -> None:
-    shown = grid.copy(deep=False)
+def _material_style(grid: pv.UnstructuredGrid | pv.PolyData) -> dict[str, Any]:
+    """Return what draws each material in its colour, with its name beside the mesh."""
     numbers = np.asarray(grid.cell_data["material"])
     materials = materials_of(grid)
-    colors = np.round(255 * material_colors(materials)).astype(np.uint8)
-    shown.cell_data["color"] = colors[np.searchsorted(materials.labels, numbers)]
-    plotter.add_mesh(shown, scalars="color", rgb=True, show_edges=show_edges, lighting=False, **kwargs)
-    used = [i for i, number in enumerate(materials.labels) if number in numbers][:MOST_IN_LEGEND]
-    labels = [[materials.names[i], tuple(colors[i] / 255.0)] for i in used]
-    size = (0.22, 0.035 * len(labels) + 0.02)
-    plotter.add_legend(labels, face="rectangle", bcolor="white", loc="upper right", size=size)
+    used, index = np.unique(np.searchsorted(materials.labels, numbers), return_inverse=True)
+    colors = material_colors(materials)[used]
+    names = {place: materials.names[k] for place, k in enumerate(used[:MOST_IN_LEGEND].tolist())}
+    height = min(0.06 * len(used) + 0.06, 0.9)
+    return {
+        "mesh": grid.copy(),
+        "scalars": index.ravel().astype(np.int32),
+        "preference": "cell",
+        "cmap": [pv.Color(color).hex_rgb for color in colors],
+        "n_colors": len(used),
+        "clim": (-0.5, len(used) - 0.5),
+        "annotations": names,
+        "show_scalar_bar": len(used) <= MOST_IN_LEGEND,
+        "scalar_bar_args": _BAR | {"title": " ", "n_labels": 0, "height": height, "position_x": 0.95, "width": 0.03},
+    }
+
+
+def _measure_style(grid: pv.UnstructuredGrid | pv.PolyData, scalars: str) -> dict[str, Any]:
+    limits, colors = MEASURES[scalars]
+    bar = _BAR | {"title": scalars.replace("_", " "), "height": 0.6, "fmt": "%.2g"}
+    return {"mesh": grid, "scalars": scalars, "clim": limits, "cmap": colors, "scalar_bar_args": bar}
 
 
 def _mark_irregular(plotter: Any, grid: pv.UnstructuredGrid | pv.PolyData) -> None:
@@ -69,9 +89,6 @@ def _mark_irregular(plotter: Any, grid: pv.UnstructuredGrid | pv.PolyData) -> No
 
 def on_boundary(grid: pv.UnstructuredGrid | pv.PolyData) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Tell of each point whether it lies on the border or between two materials."""
-    from imgquad_core.halfedge import twins_of
-    from imgquad_mesh.grids import quads_of
-
     quads = quads_of(grid)
     twins = twins_of(quads, grid.n_points)
     material = np.asarray(grid.cell_data.get("material", np.zeros(len(quads), np.int32)))
@@ -83,12 +100,16 @@ def on_boundary(grid: pv.UnstructuredGrid | pv.PolyData) -> np.ndarray[Any, np.d
 
 
 def look_at(plotter: Any, grid: pv.UnstructuredGrid | pv.PolyData) -> None:
-    """Look at a plane mesh from its front, in parallel projection, filling the window."""
-    from imgquad_mesh.grids import plane_of
-
-    plane = plane_of(grid)
-    normal = np.cross(*plane.axes)
+    """Look at a plane mesh from its front, in parallel projection, with room on the right for the legend."""
+    points, plane = flattened(grid)
+    low, high = points.min(axis=0), points.max(axis=0)
+    left, lower, right, upper = plotter.renderer.viewport
+    across = plotter.window_size[0] * (right - left) / (plotter.window_size[1] * (upper - lower))
+    width, height = high - low
+    scale = MARGIN * max(height, width / (across * (1.0 - ROOM))) / 2.0
+    middle = plane.place(((low + high) / 2.0 + (scale * across * ROOM, 0.0))[None])[0]
     plotter.enable_parallel_projection()
-    plotter.view_vector(normal, viewup=plane.axes[1])
-    plotter.reset_camera(bounds=grid.bounds)
-    plotter.camera.zoom(1.1)
+    plotter.view_vector(np.cross(*plane.axes), viewup=plane.axes[1])
+    plotter.camera.position = middle + np.cross(*plane.axes) * 10.0 * scale
+    plotter.camera.focal_point = middle
+    plotter.camera.parallel_scale = scale
