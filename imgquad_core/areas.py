@@ -18,6 +18,7 @@ from imgquad_core.curves import Floats, Ints
 from imgquad_core.jit import kernel
 
 _STEPS = 5
+_SMALL = 50  # px; smaller regions take what cannot be given to all
 _GOOD = 1e-4  # share of a region's area that may stay missing
 
 
@@ -148,11 +149,12 @@ def _shifts(weight: Floats, sides: Ints, missing: Floats, target: NDArray[Any]) 
 
 
 def _consistent(adjacency: Any, missing: Floats, target: Floats) -> Floats:
-    """Take from each connected group of regions what no shift within it can give, by area."""
+    """Take from each connected group of regions what no shift within it can give, from small regions by area."""
     n_groups, group = connected_components(adjacency, directed=False)
-    spare = np.bincount(group, missing, n_groups) / np.maximum(np.bincount(group, target, n_groups), 1e-12)
+    share = np.where(target < _SMALL, target, 1e-3 * target)
+    spare = np.bincount(group, missing, n_groups) / np.maximum(np.bincount(group, share, n_groups), 1e-12)
     spare[group[-1]] = 0.0  # joined to the outside, which takes any area
-    return np.asarray(missing - spare[group] * target, np.float64)
+    return np.asarray(missing - spare[group] * share, np.float64)
 
 
 def _conjugate_gradients(matrix: Any, right: Floats) -> Floats:

@@ -126,7 +126,7 @@ def _raise(marks: NDArray[np.uint8], k: int, mark: int) -> None:
 
 @kernel
 def _any_new(chain: Ints, is_new: Flags, items: Ints, low: int, high: int) -> bool:
-    for i in range(low, high):  # noqa: SIM110 - kernels know no generators
+    for i in range(low, high):
         if is_new[chain[items[i]]]:
             return True
     return False

@@ -15,7 +15,9 @@ from imgquad_core.model import PointKind
 _NEAR, _FAR = 1.2, 8.0  # px of arc of a chain that its line is fitted to
 _PULL = 0.15  # weight of the old place against that of one line
 _FARTHEST = 0.5  # px that a node moves at most
+_BESIDE = 1.5  # px of arc of its chains whose room a node minds too
 _ROOM = 0.35  # of the local feature size and of the shortest chain at the node, so that no two nodes can meet
+_NOTCH = np.radians(205.0)  # no sector gets wider
 _BORDER_WINDOWS = np.array(
     [96.0, 68.0, 48.0, 36.0, 27.0, 20.0, 15.0, 11.0]
 )  # px of arc that say where a chain meets the border
@@ -61,8 +63,46 @@ def _place(curves: Curves, nodes: Ends, room: Floats, width: float, height: floa
         size = np.hypot(dx, dy)
         if size > limit:
             dx, dy = dx * limit / size, dy * limit / size
+        if not (on_side or on_end):
+            scale = _scale(curves, nodes, v, dx, dy)
+            dx, dy = dx * scale, dy * scale
         placed[v, 0], placed[v, 1] = x + dx, y + dy
     return placed
+
+
+@kernel
+def _scale(curves: Curves, nodes: Ends, v: int, dx: float, dy: float) -> float:
+    """Choose the share of a shift that opens no sector to a notch in the region there."""
+    widest = max(_widest_sector(curves, nodes, v, 0.0, 0.0), _NOTCH)
+    for k in range(3):
+        scale = 0.5**k
+        if _widest_sector(curves, nodes, v, scale * dx, scale * dy) <= widest:
+            return scale
+    return 0.0
+
+
+@kernel
+def _widest_sector(curves: Curves, nodes: Ends, v: int, dx: float, dy: float) -> float:
+    """Widest angle between the chains of a shifted node, as they run a pixel away from it."""
+    widest = 0.0
+    for k in range(nodes.offsets[v], nodes.offsets[v + 1]):
+        mine, next_one = _bearing(curves, nodes.sockets[k], dx, dy), 2.0 * np.pi
+        for j in range(nodes.offsets[v], nodes.offsets[v + 1]):
+            if j != k:
+                next_one = min(next_one, (_bearing(curves, nodes.sockets[j], dx, dy) - mine) % (2.0 * np.pi))
+        widest = max(widest, next_one)
+    return widest
+
+
+@kernel
+def _bearing(curves: Curves, socket: int, dx: float, dy: float) -> float:
+    """Direction from the shifted end of a chain to its point a pixel away."""
+    first, last = curves.offsets[socket // 2], curves.offsets[socket // 2 + 1] - 1
+    end, step = (last, -1) if socket % 2 else (first, 1)
+    i = end
+    while first <= i + step <= last and abs(curves.arc[i] - curves.arc[end]) < 1.0:
+        i += step
+    return float(np.arctan2(curves.raw[i, 1] - curves.raw[end, 1] - dy, curves.raw[i, 0] - curves.raw[end, 0] - dx))
 
 
 @kernel
@@ -72,7 +112,12 @@ def _limit(curves: Curves, nodes: Ends, room: Floats, v: int) -> float:
         socket = nodes.sockets[k]
         c = socket // 2
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
-        limit = min(limit, _ROOM * curves.arc[last], room[last if socket % 2 else first])
+        limit = min(limit, _ROOM * curves.arc[last])
+        end, step = (last, -1) if socket % 2 else (first, 1)
+        i = end
+        while first <= i <= last and abs(curves.arc[i] - curves.arc[end]) <= _BESIDE:
+            limit = min(limit, room[i])
+            i += step
     return limit
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from imgquad_core.curves import Curves, Flags, Floats, Ints
 from imgquad_core.jit import kernel
 
-_LONG = 2.6  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
+_LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
 _COARSE = 0.6  # mean size over asked size from which that is of use
 _SWEEPS = 3
 
