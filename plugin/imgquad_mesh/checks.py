@@ -128,7 +128,6 @@ def _material(value: Any, name: str) -> str | int:
 #: parameters that are no plain numbers, choices or flags in filters.xml, or not in it
 _OWN: Mapping[str, Callable[[Any, str], Any]] = {
     "size": _length,
-    "inner_size": _length_or_none,
     "boundary_size": _length_or_none,
     "material_sizes": _sizes,
     "colors": _colors,

@@ -302,16 +302,13 @@ def quads(
     given = from_lines(lines)
     if given.sizes is None:
         raise InputError("these boundaries are not smoothed: call .imgquad.smooth(size=...) on them first")
-    asked = checked(inner_size=size, material_sizes=material_sizes)
-    asked = _in_pixels(asked, unit, given.placement.pixel_size)
-    options = MeshingOptions(
-        size=given.sizes[0] if size is None else asked["inner_size"],
-        growth=given.sizes[1] if growth is None else checked(growth=growth)["growth"],
-        material_sizes=given.sizes[2]
-        if material_sizes is None
-        else _numbered(asked["material_sizes"], given.materials),
-        **checked(effort=effort, threads=threads),
-    )
+    values: dict[str, Any] = dict(zip(("size", "growth", "material_sizes"), given.sizes, strict=True))
+    asked = {"size": size, "material_sizes": material_sizes}
+    sizes = checked(**{name: value for name, value in asked.items() if value is not None})
+    values |= _in_pixels(sizes, unit, given.placement.pixel_size)
+    values["material_sizes"] = _numbered(values["material_sizes"], given.materials)
+    values |= checked(effort=effort, threads=threads) | ({} if growth is None else checked(growth=growth))
+    options = MeshingOptions(**values)
     with progress_of(progress_bar) as begin:
         begin("mesh")
         return to_grid(filled(given, options), given.placement)

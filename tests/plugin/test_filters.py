@@ -216,5 +216,24 @@ def test_errors_are_pyvistas_and_say_the_way_out() -> None:
         changed.imgquad.mesh()
 
 
+def test_progress_bar_changes_nothing() -> None:
+    assert_same(point_image().imgquad.mesh(progress_bar=True), point_image().imgquad.mesh())
+
+
 def test_same_input_same_bits() -> None:
     assert_same(point_image(photo()).imgquad.mesh(), point_image(photo()).imgquad.mesh(threads=2))
+
+
+@pytest.mark.parametrize("name", ["im2mesh_7phases.png", "composite_weave_labels_z75.png"])
+def test_real_pictures_as_pyvista_reads_them(images: Path, name: str) -> None:
+    image = pv.read(images / name)
+    assert image.active_scalars_name == "PNGImage"
+    whole = image.imgquad.mesh(size=4)
+    assert_same(chain(image, 4.0), whole)
+    assert np.allclose(whole.bounds, image.points_to_cells("PNGImage").bounds)
+    assert areas(whole).min() > 0
+    assert areas(whole).sum() == pytest.approx(image.n_points)
+    ours, theirs = whole.imgquad.quality(), whole.cell_quality(["scaled_jacobian", "min_angle", "max_angle"])
+    for measure in ("scaled_jacobian", "min_angle", "max_angle"):
+        assert np.abs(ours[measure] - theirs[measure]).max() < 1e-9
+    assert whole.validate_mesh().is_valid
