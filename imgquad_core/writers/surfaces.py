@@ -13,9 +13,11 @@ from imgquad_core.writers.common import refuse_3d, refuse_cohesive, replacing, r
 
 
 def write_obj(mesh: FEMesh, path: str | Path) -> None:
-    """Write a Wavefront file (``.obj``): quads, a group and a material name for each material."""
+    """Write a Wavefront file (``.obj``): quads, a group and a material for each material, with its colour (``.mtl``)."""
     points, quads = _corners(mesh, "OBJ")
-    write_text(path, _obj(mesh, points, quads))
+    library = Path(path).with_suffix(".mtl")
+    write_text(library, _mtl(mesh))
+    write_text(path, _obj(mesh, points, quads, library.name))
 
 
 def write_off(mesh: FEMesh, path: str | Path) -> None:
@@ -71,8 +73,17 @@ def _colors(mesh: FEMesh) -> NDArray[np.uint8]:
     return colors
 
 
-def _obj(mesh: FEMesh, points: Floats, quads: Ints) -> Iterator[str]:
-    yield "# imgquad-mesh\n"
+def _mtl(mesh: FEMesh) -> Iterator[str]:
+    # rounded up: readers that cut off the fraction of 255 times a value get the same colour
+    colors, sets = np.ceil(_colors(mesh) / 255.0 * 1e6) / 1e6, mesh.material_cells()
+    names = safe_names(sets, 255)
+    for name, ids in sets.items():
+        if len(ids):
+            yield "newmtl {}\nKd {:.6f} {:.6f} {:.6f}\n".format(names[name], *colors[ids[0]])
+
+
+def _obj(mesh: FEMesh, points: Floats, quads: Ints, library: str) -> Iterator[str]:
+    yield f"# imgquad-mesh\nmtllib {library}\n"
     yield from rows("v %.16g %.16g %.16g\n", points)
     sets = mesh.material_cells()
     names = safe_names(sets, 255)

@@ -14,6 +14,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.model import Materials
 from imgquad_core.pipeline import MeshOptions, mesh_image
 from imgquad_mesh.catalogue import MissingMeshLab, meshlab_filters
+from imgquad_mesh.files import write_mesh_file
 from imgquad_mesh.layer import (
     Layer,
     face_of_triangle,
@@ -277,6 +278,25 @@ def test_ply_keeps_quads_for_others(tmp_path: Path) -> None:
     assert np.allclose(read.points[:, :2], mesh.points, rtol=1e-6)  # VTK reads single precision
     colors = dict(zip(mesh.materials.labels.tolist(), mesh.materials.colors.tolist(), strict=True))
     assert read.cell_data["RGBA"][:, :3].tolist() == [colors[m] for m in mesh.quad_material.tolist()]
+
+
+@pytest.mark.parametrize("extension", [".obj", ".off", ".ply"])
+def test_files_of_ours_load_in_meshlab_with_quads_and_colours(extension: str, tmp_path: Path) -> None:
+    mesh = mesh_image(np.eye(12, dtype=np.int32) * 4, MeshOptions(size=3))
+    write_mesh_file(mesh, tmp_path / f"m{extension}")
+    with MeshLabProcess(tmp_path, 30.0) as process:
+        process.open(tmp_path / f"m{extension}")
+        layer = process.layer()
+    assert layer.n_faces == mesh.n_quads
+    assert (layer.face_sizes == 4).all()
+    assert layer.face_color is not None
+    ours = np.concatenate([layer.points[f][:, :2] for f in layer.face_points.reshape(-1, 4)])
+    assert np.isclose(np.abs(ours).sum(), np.abs(mesh.points[mesh.quads]).sum(), rtol=1e-12)
+    found, counts = np.unique(layer.face_color[:, :3], axis=0, return_counts=True)
+    colors = mesh.materials.colors[np.searchsorted(mesh.materials.labels, mesh.quad_material)]
+    expected, expected_counts = np.unique(colors, axis=0, return_counts=True)
+    assert found.tolist() == expected.tolist()
+    assert counts.tolist() == expected_counts.tolist()
 
 
 def test_triangles_find_their_faces() -> None:

@@ -21,6 +21,7 @@ from imgquad_mesh.catalogue import MissingMeshLab, meshlab_filters, meshlab_para
 from imgquad_mesh.checking import MeshLabStep, checked_steps
 from imgquad_mesh.layer import Layer, write_ply
 from imgquad_mesh.mlx import Script, read_script, script_text
+from imgquad_mesh.names import meshlab_function
 from imgquad_mesh.script import run_script
 from imgquad_mesh.spec import filters, python_name
 from imgquad_mesh.templates import filter_script, named_filters, run_as_script
@@ -277,6 +278,7 @@ def scripts(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip("the scripts are written in forked processes")
     folder = tmp_path_factory.mktemp("scripts")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "plugin")])}
+    environment |= {"OMP_NUM_THREADS": "1"}  # threads of OpenMP in forked processes wait for each other at times
     command = [sys.executable, str(ROOT / "tests/meshlab_scripts.py"), str(folder)]
     subprocess.run(command, check=True, timeout=400, capture_output=True, env=environment)
     return folder
@@ -489,3 +491,18 @@ def test_command_lists_filters_and_prints_scripts(tmp_path: Path, capsys: pytest
     assert [step.function for step in steps] == list(filters())
     assert command("filters", "--mlx", "Image to Quat Mesh") == 2
     assert "did you mean 'Image to Quad Mesh'" in capsys.readouterr().err
+
+
+# ------------------------------------------------------------------------------------------------------- the docs
+
+
+@needs_meshlab
+def test_script_in_the_docs_runs(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "meshlab.md").read_text(encoding="utf-8")
+    (tmp_path / "rock.mlx").write_text(page.split("```xml\n")[1].split("```")[0], encoding="utf-8")
+    result = run_script(tmp_path / "rock.mlx", image=LABELS, output=tmp_path / "rock.obj")
+    assert result.values("get_quad_quality_measures")["inverted"] == 0
+    assert (tmp_path / "rock.inp").is_file()
+    for name in ("Subdivision Surfaces: Midpoint", "Conditional Face Selection", "Laplacian Smooth"):
+        assert name in page
+        assert meshlab_function(name, meshlab_filters())
