@@ -44,7 +44,7 @@ def _tile(mesh: FaceQuads) -> Ids:
     corner = mesh.points[mesh.quads[:, 0]]
     area = np.ptp(mesh.points, axis=0).prod() / max(1, len(mesh.quads))
     cell = np.floor(corner / (TILE * np.sqrt(area) + 1e-300)).astype(np.int64)
-    return cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0]
+    return np.asarray(cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0])
 
 
 def _part(mesh: FaceQuads, quads: Ids) -> FaceQuads:

@@ -46,7 +46,7 @@ class Cavity(NamedTuple):
     edge: Ids  # half-edge of the outline that leaves each of its nodes
     corner: Ids  # places of the corners in the outline
     length: Ids  # edges between corners
-    count: Ids  # see below
+    count: Ids  # type: ignore[assignment]  # see below
 
 
 # what Cavity.count holds
@@ -54,6 +54,7 @@ MEMBERS, OUTLINE, CORNERS, STAMP, RIM_EDGES, COST, DOUBTFUL = range(7)
 
 
 def net_of(mesh: FaceQuads, largest: int) -> Net:
+    """Return the mesh in arrays with room to change, for cavities of up to `largest` quads."""
     n, m = len(mesh.points), len(mesh.quads)
     # cavities may gain quads: room for one that grows by MOST, and a share of the mesh
     node_room, quad_room = n + n // 4 + 2 * largest, m + m // 4 + 2 * largest
@@ -77,6 +78,7 @@ def net_of(mesh: FaceQuads, largest: int) -> Net:
 
 
 def padded(values: NDArray[Any], room: int, filler: Any) -> NDArray[Any]:
+    """Return `values` with `filler` behind them, `room` rows in all."""
     out = np.full((room, *values.shape[1:]), filler, values.dtype)
     out[: len(values)] = values
     return out
@@ -94,17 +96,20 @@ def _scratch_points(largest: int) -> int:
 
 
 def scratch(net: Net, largest: int) -> tuple[Cavity, Canvas]:
+    """Return empty work arrays for cavities of up to `largest` quads."""
     n, m, few = len(net.valence), len(net.quads), _scratch_points(largest)
-    lists = [np.empty(few, np.int64) for _ in range(8)]
     cavity = Cavity(
-        lists[0],
+        np.empty(few, np.int64),
         np.zeros(m, np.int64),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
         np.empty(16 * few, np.int64),
-        *lists[1:5],
+        np.empty(few, np.int64),
+        np.empty(few, np.int64),
+        np.empty(few, np.int64),
+        np.empty(few, np.int64),
         np.zeros(7, np.int64),
     )
     canvas = Canvas(
@@ -112,7 +117,9 @@ def scratch(net: Net, largest: int) -> tuple[Cavity, Canvas]:
         n,
         np.empty((few, 4), np.int64),
         np.zeros(2, np.int64),
-        *lists[5:8],
+        np.empty(few, np.int64),
+        np.empty(few, np.int64),
+        np.empty(few, np.int64),
         np.empty(few, np.int64),
         np.empty((few, 3)),
     )
@@ -183,7 +190,7 @@ def add_ring(net: Net, cavity: Cavity, v: int) -> bool:
     before = cavity.count[MEMBERS]
     for i in range(net.valence[v]):
         add_quad(net, cavity, net.ring[v, i])
-    return cavity.count[MEMBERS] > before
+    return bool(cavity.count[MEMBERS] > before)
 
 
 @kernel
@@ -212,14 +219,14 @@ def _leaving_edge(net: Net, cavity: Cavity, v: int) -> int:
     h = cavity.leave[v]
     t = net.twins[h]
     if t < 0 or cavity.in_cavity[t >> 2] != cavity.count[STAMP]:
-        return h
+        return int(h)
     for i in range(net.valence[v]):  # it has become inner: v was a pinch for a while
         q = net.ring[v, i]
         if cavity.in_cavity[q] == cavity.count[STAMP]:
             for h in range(4 * q, 4 * q + 4):
                 t = net.twins[h]
                 if net.quads[q, h & 3] == v and (t < 0 or cavity.in_cavity[t >> 2] != cavity.count[STAMP]):
-                    return h
+                    return int(h)
     return -1
 
 
@@ -255,7 +262,7 @@ def _trace_outline(net: Net, cavity: Cavity) -> bool:
     if c > 0:
         cavity.length[c - 1] = n - cavity.corner[c - 1] + cavity.corner[0]
     count[OUTLINE], count[CORNERS] = n, c
-    return n == total
+    return bool(n == total)
 
 
 @kernel
@@ -292,7 +299,7 @@ def push_all(net: Net, cavity: Cavity) -> bool:
         t = net.twins[cavity.edge[i]]
         if t >= 0:
             add_quad(net, cavity, t >> 2)
-    return cavity.count[MEMBERS] > before
+    return bool(cavity.count[MEMBERS] > before)
 
 
 @kernel
@@ -365,4 +372,6 @@ def compact(net: Net, mesh: FaceQuads) -> FaceQuads:
     used = net.quads[:, 0] >= 0
     origin = padded(mesh.origin, len(alive), -1)
     origin[~net.rim] = -1
-    return FaceQuads(net.points[: len(alive)][alive], new[net.quads[used]], net.face[used], origin[alive], net.wanted[alive])
+    return FaceQuads(
+        net.points[: len(alive)][alive], new[net.quads[used]], net.face[used], origin[alive], net.wanted[alive]
+    )

@@ -56,7 +56,7 @@ def _corner(points: Points, v: int, a: int, b: int) -> tuple[float, float]:
 
 @kernel
 def _pair_quality(points: Points, triangles: Ids, twins: Ids, on_rim: NDArray[np.bool_]) -> Points:
-    """Scaled Jacobian of the pair beside each half-edge; -1 on the rim, where it is barred, and for one of two twins."""
+    """Scaled Jacobian of the pair beside each half-edge; -1 on the rim, where barred, and for one of two twins."""
     quality = np.full(twins.size, -1.0)
     for h in range(twins.size):
         g = twins[h]
@@ -109,7 +109,7 @@ def _augment(mate: Ids, twins: Ids, quality: Points) -> int:
                     continue
                 worst = min(max(quality[ta], quality[twins[ta]]), max(quality[bu], quality[twins[bu]]))
                 if worst > best:
-                    best, best_ta, best_bu = worst, ta, bu
+                    best, best_ta, best_bu = worst, ta, bu  # type: ignore[assignment]
         if best_ta >= 0:
             for h in (best_ta, best_bu):
                 mate[h // 3] = h

@@ -58,9 +58,7 @@ def cut_at_constraints(mesh: Triangles, constraints: Constraints) -> CutMesh | F
     keep = face >= 0
     triangles, twins, middle = _compress(mesh.triangles, twins, middle, keep)
     corner_copy, origin, on_rim, angle = _copies(mesh.points, triangles, twins)
-    return CutMesh(
-        mesh.points[origin], corner_copy, twins, face[keep], origin, on_rim, angle, middle
-    )
+    return CutMesh(mesh.points[origin], corner_copy, twins, face[keep], origin, on_rim, angle, middle)
 
 
 @kernel
@@ -145,7 +143,7 @@ def _corner_angle(points: Points, triangles: Ids, c: int) -> float:
     v, a, b = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
     ax, ay = points[a, 0] - points[v, 0], points[a, 1] - points[v, 1]
     bx, by = points[b, 0] - points[v, 0], points[b, 1] - points[v, 1]
-    return np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+    return float(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
 @kernel

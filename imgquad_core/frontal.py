@@ -67,7 +67,7 @@ class Spokes(NamedTuple):
 
 def wanted_quads(angle: Points) -> Ids:
     """Return how many quads a sector of `angle` radians should hold: as near to right angles as can be, at least 1."""
-    return np.maximum(1, np.floor(angle / QUARTER + 0.5)).astype(np.int64)
+    return np.asarray(np.maximum(1, np.floor(angle / QUARTER + 0.5)), np.int64)
 
 
 def spokes_of_rim(mesh: CutMesh) -> Spokes:
@@ -124,7 +124,7 @@ def _walk(mesh_points: Points, triangles: Ids, twins: Ids, t: int, x: float, y: 
                 blocked = True
         if step < 0:
             return -1 if blocked else t
-        t = step
+        t = int(step)
     return -1
 
 

@@ -41,7 +41,7 @@ class Canvas(NamedTuple):
     points: Points  #: points of the mesh with room for the drawn ones from ``first`` on
     first: int
     quads: Ids  #: (capacity, 4)
-    count: Ids  #: (2,)
+    count: Ids  # type: ignore[assignment]  #: (2,)
     lattice: Ids  #: scratch of a grid's node ids
     poly: Ids  #: scratch of a piece's outline
     spokes: Ids  #: scratch of spokes' node ids
@@ -64,7 +64,7 @@ def spoke(length: Ids, n: int, i: int) -> int:
 def piece_fits(length: Ids, n: int) -> bool:
     """Whether one pattern without a cut fills a polygon with sides `length`."""
     if n == 4:
-        return length[0] == length[2] and length[1] == length[3]
+        return bool(length[0] == length[2] and length[1] == length[3])
     if n != 3 and n != 5:
         return False
     for i in range(n):
@@ -75,7 +75,7 @@ def piece_fits(length: Ids, n: int) -> bool:
 
 @kernel
 def _cut_sides(length: Ids, n: int, i: int, j: int, a: int, b: int, l: int, one: Ids, two: Ids) -> None:
-    """Sides of both pieces of a cut of l edges from side i behind its first a edges to side j (>= i) behind its first b."""
+    """Sides of both pieces of a cut of l edges, from side i behind its first a edges to side j >= i behind its b."""
     one[0] = length[i] - a
     for k in range(i + 1, j):
         one[k - i] = length[k % n]
@@ -125,7 +125,7 @@ def choose_cut(points: Points, loop: Ids, corner: Ids, length: Ids, n: int, edge
 def piece_quads(length: Ids, n: int) -> int:
     """Number of quads in the pattern of a piece."""
     if n == 4:
-        return length[0] * length[1]
+        return int(length[0] * length[1])
     total = 0
     for i in range(n):
         total += spoke(length, n, i) * spoke(length, n, (i + 1) % n)
@@ -146,7 +146,7 @@ def _draw_point(canvas: Canvas, x: float, y: float) -> int:
     p = canvas.first + canvas.count[0]
     canvas.points[p, 0], canvas.points[p, 1] = x, y
     canvas.count[0] += 1
-    return p
+    return int(p)
 
 
 @kernel

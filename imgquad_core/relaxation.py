@@ -21,7 +21,7 @@ Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-GUARD = 0.6  # a Laplace move may lower a ring's worst scaled Jacobian down to this, not further
+GUARD = 0.6  # a move may lower a ring's worst scaled Jacobian down to this, not further
 TOLERANCE = 0.01  # of the edge length: smaller moves stop the activity of a node
 GOOD = 0.9  # Newton works on rings with a quad below this
 BAD = 0.35  # the pattern search works on rings below this
@@ -49,7 +49,7 @@ def corner_sine(points: Points, quads: Ids, q: int, k: int) -> float:
     v, a, b = quads[q, k], quads[q, (k + 1) & 3], quads[q, (k + 3) & 3]
     ax, ay = points[a, 0] - points[v, 0], points[a, 1] - points[v, 1]
     bx, by = points[b, 0] - points[v, 0], points[b, 1] - points[v, 1]
-    return (ax * by - ay * bx) / (np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by)) + 1e-300)
+    return float((ax * by - ay * bx) / (np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by)) + 1e-300))
 
 
 @kernel
@@ -63,11 +63,10 @@ def quad_quality(points: Points, quads: Ids, q: int) -> float:
 
 @kernel
 def quad_area(points: Points, quads: Ids, q: int) -> float:
+    """Signed area of a quad."""
     a, b, c, d = quads[q, 0], quads[q, 1], quads[q, 2], quads[q, 3]
-    return 0.5 * (
-        (points[c, 0] - points[a, 0]) * (points[d, 1] - points[b, 1])
-        - (points[d, 0] - points[b, 0]) * (points[c, 1] - points[a, 1])
-    )
+    ac_x, ac_y = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
+    return float(0.5 * (ac_x * (points[d, 1] - points[b, 1]) - (points[d, 0] - points[b, 0]) * ac_y))
 
 
 @kernel
@@ -200,7 +199,8 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             if not (active[v] and free[v]):
                 continue
             active[v] = False
-            if ring_quality(points, rings, v) >= good:
+            before = ring_quality(points, rings, v)
+            if before >= good:
                 continue
             _ring_energy(points, rings, v, now)
             if not np.isfinite(now[0]) or now[0] == 0.0:
@@ -213,8 +213,8 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             for _ in range(HALVINGS):
                 points[v, 0], points[v, 1] = x + dx, y + dy
                 _ring_energy(points, rings, v, then)
-                if then[0] < now[0]:
-                    break
+                if then[0] < now[0] and ring_quality(points, rings, v) >= min(before, GUARD):
+                    break  # the energy alone would pay for length with angles
                 points[v, 0], points[v, 1] = x, y
                 dx, dy = 0.5 * dx, 0.5 * dy
             if abs(points[v, 0] - x) + abs(points[v, 1] - y) > TOLERANCE * reach:

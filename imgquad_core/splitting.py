@@ -49,7 +49,7 @@ def split_composed(mesh: CutMesh, mate: Ids, inner_origin_from: int) -> FaceQuad
     inner_origin_from : int
         Points of the mesh with this origin or a higher one are not of the boundary graph.
     """
-    points, quads, owner, origin, middle_of = _split_composed(mesh.points, mesh.triangles, mesh.twins, mate, mesh.middle)
+    points, quads, owner, origin, _ = _split_composed(mesh.points, mesh.triangles, mesh.twins, mate, mesh.middle)
     n = len(mesh.points)
     origin[:n] = np.where(mesh.on_rim & (mesh.origin < inner_origin_from), mesh.origin, -1)
     wanted = np.full(len(points), INNER_VALENCE, np.int64)

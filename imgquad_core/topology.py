@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cavity import (
-    COST,
     CORNERS,
+    COST,
     MEMBERS,
     OUTLINE,
     Cavity,
@@ -114,7 +114,7 @@ def _mean_edge(points: Points, cavity: Cavity) -> float:
     for i in range(n):
         u, w = cavity.loop[i], cavity.loop[(i + 1) % n]
         total += np.hypot(points[u, 0] - points[w, 0], points[u, 1] - points[w, 1])
-    return total / n
+    return float(total / n)
 
 
 @kernel
@@ -184,17 +184,22 @@ def _choose(net: Net, cavity: Cavity, cut: Ids, last_gain: int, last_size: int) 
         return NONE, 0
     if whole:
         return WHOLE, gain
-    if choose_cut(
-        net.points, cavity.loop, cavity.corner, cavity.length, n, _mean_edge(net.points, cavity), cut
-    ):
+    if choose_cut(net.points, cavity.loop, cavity.corner, cavity.length, n, _mean_edge(net.points, cavity), cut):
         return CUT, gain
     return NONE, 0
 
 
 @kernel
 def _remesh_around(
-    net: Net, cavity: Cavity, canvas: Canvas, seed: int, largest: int, tolerance: float, worst: float,
-    cut: Ids, new_id: Ids,
+    net: Net,
+    cavity: Cavity,
+    canvas: Canvas,
+    seed: int,
+    largest: int,
+    tolerance: float,
+    worst: float,
+    cut: Ids,
+    new_id: Ids,
 ) -> bool:
     """Grow a cavity around node `seed` and remesh it; return whether that was done."""
     begin(cavity)
@@ -231,5 +236,3 @@ def _clean_pass(net: Net, cavity: Cavity, canvas: Canvas, largest: int, toleranc
         if _remesh_around(net, cavity, canvas, v, largest, tolerance, worst, cut, new_id):
             done += 1
     return done
-
-

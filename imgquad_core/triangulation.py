@@ -77,7 +77,7 @@ def triangulate(points: Points, segments: Ids, max_area: float | None = None) ->
         raise TopologyError(f"cannot triangulate {len(points)} points with {len(segments)} segments")
     # a fixed format: Triangle reads 'a1e-05' as a1 followed by switch e
     switches = "pnQ" if max_area is None else f"pYYq20a{max_area:.9f}nQ"
-    writeable = np.require(points, np.float64, "CW")  # Triangle takes no read-only array
+    writeable = np.require(points, np.float64, ["C", "W"])  # Triangle takes no read-only array
     out = triangle.triangulate({"vertices": writeable, "segments": segments.astype(np.int32)}, switches)
     if "triangles" not in out or "neighbors" not in out:
         raise TopologyError("the boundaries enclose nothing: Triangle gave no triangle")
