@@ -23,7 +23,7 @@ from .errors import InputError, TopologyError
 from .frontal import frontal_points, wanted_quads
 from .halfedge import twins_of
 from .model import BoundaryGraph, Materials, PointKind, QuadMesh
-from .outline import Flags, Outline, chains_of, coarse_segments, halved, outline, wide_faces
+from .outline import Flags, Outline, chains_of, coarse_segments, halved, outline, wide_faces, with_short_chains_halved
 from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
 from .repair import repair
 from .splitting import INNER_VALENCE, FaceQuads, middles_of, split_composed, split_quads
@@ -34,7 +34,7 @@ Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
 
 STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
-LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
+LEAST_WIDTH = 1.5  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
 POOR = 0.5  # scaled Jacobian below which single quads are replaced
@@ -51,8 +51,8 @@ class Effort(NamedTuple):
 
 EFFORTS: Mapping[str, Effort] = {
     "fast": Effort(CleanUp((16, 40), 0.2, 0.6), CleanUp((16,), 0.2, 0.6), 0.4),
-    "normal": Effort(CleanUp((40, 160), 0.2, 0.6), CleanUp((16, 40, 80), 0.2, 0.6), 0.5),
-    "best": Effort(CleanUp((16, 40, 80, 160), 0.4, 0.6), CleanUp((16, 40, 80, 160), 0.4, 0.6), 0.6),
+    "normal": Effort(CleanUp((40, 160), 0.5, 0.6), CleanUp((16, 40, 80), 0.5, 0.6), 0.5),
+    "best": Effort(CleanUp((16, 40, 80, 160, 160), 1.0, 0.6), CleanUp((16, 40, 80, 160), 1.0, 0.6), 0.5),
 }
 
 
@@ -140,7 +140,7 @@ def mesh_boundaries(
         If the chains cross.
     """
     options = options or MeshingOptions()
-    graph = _consistent(graph)
+    graph = with_short_chains_halved(_consistent(graph), LEAST_WIDTH)
     for _ in range(REFITS):
         parts, stuck = _mesh_faces(graph, options)
         if len(stuck) == 0:

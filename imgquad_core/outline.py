@@ -9,18 +9,21 @@ A face is meshed one or two levels coarser than its final edges and split once o
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .clearance import find_conflicts
+from .clearance import CROSSING, find_conflicts
 from .model import VOID, BoundaryGraph
 from .triangulation import Constraints, constraint_table
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+
+MOST_SHORT = 0.25  # share of the chains around a face that may be halved for the sake of stride 4
 
 
 class Segments(NamedTuple):
@@ -73,9 +76,7 @@ def wide_faces(graph: BoundaryGraph, least_width: float) -> Flags:
 
     The width of a face is four times its area over its outline, in lengths of its stride-4 segments.
     """
-    n_regions = len(graph.region_label)
-    edges = np.diff(graph.chain_offsets) - 1
-    fits = edges % 4 == 0
+    fits = _edges(graph) % 4 == 0
     segments = coarse_segments(graph, fits, 4)
     length = np.hypot(*(graph.points[segments.head] - graph.points[segments.tail]).T)
     fits &= ~_chains_in_conflict(graph, segments, length)
@@ -83,15 +84,43 @@ def wide_faces(graph: BoundaryGraph, least_width: float) -> Flags:
     for side in (0, 1):
         at = graph.chain_regions[:, side]
         wide[at[(at >= 0) & ~fits]] = False
-    return wide & (_loop_segments(graph, n_regions) >= 4)
+    return wide & (_per_face(graph, _edges(graph) // 4) >= 4)
+
+
+def with_short_chains_halved(graph: BoundaryGraph, least_width: float) -> BoundaryGraph:
+    """Return the graph with 4 edges on chains of 2, where nothing else keeps the faces beside them from stride 4."""
+    edges = _edges(graph)
+    segments = coarse_segments(graph, edges % 4 == 0, 4)
+    length = np.hypot(*(graph.points[segments.head] - graph.points[segments.tail]).T)
+    hopeful = _width(graph, segments, length) >= least_width
+    for side in (0, 1):
+        at = graph.chain_regions[:, side]
+        hopeful[at[(at >= 0) & (edges % 4 != 0) & (edges > 2)]] = False
+    short = edges == 2
+    share = _per_face(graph, short) / np.maximum(_per_face(graph, np.ones(graph.n_chains, bool)), 1)
+    hopeful &= share <= MOST_SHORT
+    return halved(graph, short & np.append(hopeful, True)[graph.chain_regions].all(axis=1))
+
+
+def _edges(graph: BoundaryGraph) -> Ids:
+    """Return the number of edges of each chain."""
+    return np.diff(graph.chain_offsets) - 1
+
+
+def _per_face(graph: BoundaryGraph, per_chain: NDArray[Any]) -> NDArray[Any]:
+    """Sum a value of the chains around each face."""
+    total = np.zeros(len(graph.region_label) + 1)
+    for side in (0, 1):
+        np.add.at(total, graph.chain_regions[:, side], per_chain)
+    return total[:-1]
 
 
 def _chains_in_conflict(graph: BoundaryGraph, segments: Segments, length: Points) -> Flags:
-    """Return which chains have chords that cross or crowd others, or that join the same points as another chord."""
+    """Return which chains have chords that cross others, or that join the same points as another chord."""
     bad = np.zeros(graph.n_chains, bool)
     pairs = np.stack([segments.tail, segments.head], axis=1)
     marks = find_conflicts(graph.points, pairs, segments.chain, np.ones(graph.n_chains, bool), graph.shape)
-    bad[segments.chain[marks > 0]] = True
+    bad[segments.chain[marks == CROSSING]] = True
     pairs = np.sort(pairs, axis=1)
     _, first, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     bad[segments.chain[count[first.ravel()] > 1]] = True
@@ -101,24 +130,10 @@ def _chains_in_conflict(graph: BoundaryGraph, segments: Segments, length: Points
 
 def _width(graph: BoundaryGraph, segments: Segments, length: Points) -> Points:
     """Return the width of each face in lengths of its segments."""
-    around = np.zeros(len(graph.region_label) + 1)
-    count = np.zeros(len(graph.region_label) + 1)
-    per_chain = np.bincount(segments.chain, length, graph.n_chains)
-    n_per_chain = np.bincount(segments.chain, minlength=graph.n_chains)
-    for side in (0, 1):
-        np.add.at(around, graph.chain_regions[:, side], per_chain)
-        np.add.at(count, graph.chain_regions[:, side], n_per_chain)
-    edge = around[:-1] / np.maximum(count[:-1], 1)
-    return 4.0 * graph.region_pixels / np.maximum(around[:-1] * edge, 1e-9)
-
-
-def _loop_segments(graph: BoundaryGraph, n_regions: int) -> Ids:
-    """Return the number of stride-4 segments around each face."""
-    count = np.zeros(n_regions + 1, np.int64)
-    per_chain = (np.diff(graph.chain_offsets) - 1) // 4
-    for side in (0, 1):
-        np.add.at(count, graph.chain_regions[:, side], per_chain)
-    return count[:-1]
+    around = _per_face(graph, np.bincount(segments.chain, length, graph.n_chains))
+    count = _per_face(graph, np.bincount(segments.chain, minlength=graph.n_chains))
+    edge = around / np.maximum(count, 1)
+    return 4.0 * graph.region_pixels / np.maximum(around * edge, 1e-9)
 
 
 def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:

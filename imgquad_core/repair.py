@@ -1,12 +1,13 @@
 """Replace the worst quads: best quads for a small outline, whatever the valences.
 
 Around a poor quad a few small cavities are tried. Their outlines (an even number of nodes) are filled either without
-any new node, by the quads whose worst scaled Jacobian is largest (dynamic programming over the outline), or by a star:
+any new node, by the quads whose worst scaled Jacobian is largest (dynamic programming over the outline), or by a star; or the poor
+quad is collapsed:
 
     b----c         b----c
     |    |        / \\    \\        the quad i a b j splits an outline into three shorter ones;
-    a    d   or  a   o----d       a star joins every second node to a new one, o
-    | /  |        \\ /    /
+    a    d   or  a   o----d       a star joins every second node to a new one, o;
+    | /  |        \\ /    /        collapsed, two opposite corners of a quad become one node
     i----j         i----j
 """
 
@@ -15,7 +16,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .cavity import MEMBERS, OUTLINE, Cavity, Net, add_quad, add_ring, begin, compact, insert, net_of, remove, scratch, settle
+from .cavity import (
+    MEMBERS,
+    OUTLINE,
+    Cavity,
+    Net,
+    add_quad,
+    add_ring,
+    begin,
+    compact,
+    insert,
+    net_of,
+    remove,
+    scratch,
+    settle,
+)
 from .jit import kernel
 from .patterns import Canvas
 from .relaxation import quad_quality
@@ -28,7 +43,8 @@ LARGEST = 24  # quads of a cavity
 LONGEST = 16  # nodes of an outline
 LEAST_GAIN = 0.02  # of the worst scaled Jacobian
 ANY = 99  # quads that a node of the outline may need: valences do not count here
-ROUNDS = 2
+ROUNDS = 3
+COLLAPSE = 6  # the first of two trials that collapse the quad
 CENTRE_STEPS = 24
 
 
@@ -66,7 +82,7 @@ def _best_fill(points: Points, loop: Ids, n: int, best: Points, first: Ids, seco
                     worst = min(rest, quad_quality(points, corners, 0))
                     if worst > best[i, j]:
                         best[i, j], first[i, j], second[i, j] = worst, a, b
-    return best[0, n - 1]
+    return float(best[0, n - 1])
 
 
 @kernel
@@ -82,7 +98,8 @@ def _draw_fill(canvas: Canvas, loop: Ids, n: int, first: Ids, second: Ids) -> No
         if j - i < 3:
             continue
         a, b, q = first[i, j], second[i, j], canvas.count[1]
-        canvas.quads[q, 0], canvas.quads[q, 1], canvas.quads[q, 2], canvas.quads[q, 3] = loop[i], loop[a], loop[b], loop[j]
+        canvas.quads[q, 0], canvas.quads[q, 1] = loop[i], loop[a]
+        canvas.quads[q, 2], canvas.quads[q, 3] = loop[b], loop[j]
         canvas.count[1] += 1
         runs[top, 0], runs[top, 1] = i, a
         runs[top + 1, 0], runs[top + 1, 1] = a, b
@@ -112,13 +129,23 @@ def _draw_star(canvas: Canvas, loop: Ids, n: int, turn: int) -> float:
         canvas.quads[q, 0], canvas.quads[q, 3] = loop[(turn + i) % n], o
         canvas.quads[q, 1], canvas.quads[q, 2] = loop[(turn + i + 1) % n], loop[(turn + i + 2) % n]
         v = loop[i]
-        reach = max(reach, np.hypot(canvas.points[v, 0] - canvas.points[o, 0], canvas.points[v, 1] - canvas.points[o, 1]))
+        reach = max(
+            reach, np.hypot(canvas.points[v, 0] - canvas.points[o, 0], canvas.points[v, 1] - canvas.points[o, 1])
+        )
+    return _centred(canvas, reach)
+
+
+@kernel
+def _centred(canvas: Canvas, reach: float) -> float:
+    """Move the drawn point to where the worst quality is best; return that."""
+    o = canvas.first
     best, step = _worst_drawn(canvas), 0.3 * reach
     for _ in range(CENTRE_STEPS):
         x, y = canvas.points[o, 0], canvas.points[o, 1]
         best_x, best_y = x, y
         for d in range(8):
-            canvas.points[o, 0], canvas.points[o, 1] = x + step * np.cos(d * np.pi / 4), y + step * np.sin(d * np.pi / 4)
+            angle = d * np.pi / 4
+            canvas.points[o, 0], canvas.points[o, 1] = x + step * np.cos(angle), y + step * np.sin(angle)
             worst = _worst_drawn(canvas)
             if worst > best + 1e-9:
                 best, best_x, best_y = worst, canvas.points[o, 0], canvas.points[o, 1]
@@ -130,10 +157,16 @@ def _draw_star(canvas: Canvas, loop: Ids, n: int, turn: int) -> float:
 
 @kernel
 def _grow(net: Net, cavity: Cavity, q: int, trial: int) -> bool:
-    """Make the cavity of a trial: the ring of a corner of quad q (0 to 3), the quads beside it (4), all rings (5)."""
+    """Make the cavity of a trial at quad q.
+
+    0 to 3: the ring of a corner; 4: the quads beside it; 5: all rings; 6 and 7: the rings of two opposite corners.
+    """
     begin(cavity)
     if trial < 4:
         add_ring(net, cavity, net.quads[q, trial])
+    elif trial >= COLLAPSE:
+        add_ring(net, cavity, net.quads[q, trial - COLLAPSE])
+        add_ring(net, cavity, net.quads[q, trial - COLLAPSE + 2])
     else:
         add_quad(net, cavity, q)
         for k in range(4):
@@ -153,9 +186,39 @@ def _worst_member(net: Net, cavity: Cavity) -> float:
 
 
 @kernel
-def _try(net: Net, cavity: Cavity, canvas: Canvas, kind: int, best: Points, first: Ids, second: Ids) -> float:
-    """Draw a filling of the outline: 0 without a new node, 1 and 2 stars; return its worst quality."""
+def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) -> float:
+    """Draw the cavity with corners k and k + 2 of quad q made one node; return its worst quality."""
+    a, c = net.quads[q, k], net.quads[q, k + 2]
+    if net.rim[a] and net.rim[c]:
+        return -1.0
+    o = canvas.first
+    for i in range(2):
+        canvas.points[o, i] = 0.5 * (net.points[a, i] + net.points[c, i])
+    merged = a if net.rim[a] else (c if net.rim[c] else o)
+    canvas.count[0], canvas.count[1] = merged == o, 0
+    for i in range(cavity.count[MEMBERS]):
+        if cavity.members[i] == q:
+            continue
+        for j in range(4):
+            v = net.quads[cavity.members[i], j]
+            if v == a or v == c:
+                v = merged
+            elif cavity.leaving[v] == 0:
+                return -1.0  # another inner node would be left with two quads
+            canvas.quads[canvas.count[1], j] = v
+        canvas.count[1] += 1
+    reach = np.hypot(net.points[a, 0] - net.points[c, 0], net.points[a, 1] - net.points[c, 1])
+    return _centred(canvas, reach) if merged == o else _worst_drawn(canvas)
+
+
+@kernel
+def _try(
+    net: Net, cavity: Cavity, canvas: Canvas, q: int, trial: int, kind: int, best: Points, first: Ids, second: Ids
+) -> float:
+    """Draw a filling of a trial's outline: 0 without a new node, 1 and 2 stars; return its worst quality."""
     n = cavity.count[OUTLINE]
+    if trial >= COLLAPSE:
+        return _draw_collapsed(net, cavity, canvas, q, trial - COLLAPSE) if kind == 0 else -1.0
     if kind > 0:
         return _draw_star(canvas, cavity.loop, n, kind - 1)
     worst = _best_fill(net.points, cavity.loop, n, best, first, second)
@@ -170,33 +233,35 @@ def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
     for i in range(cavity.count[OUTLINE]):
         if net.valence[cavity.loop[i]] + canvas.count[1] > net.ring.shape[1]:
             return False
-    return canvas.count[1] <= net.tops[0] and canvas.count[0] <= net.tops[1]
+    return bool(canvas.count[1] <= net.tops[0] and canvas.count[0] <= net.tops[1])
 
 
 @kernel
 def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float) -> int:
     """Try to replace each quad worse than `below`; return how many cavities were filled anew."""
-    best, first, second = np.empty((LONGEST, LONGEST)), np.empty((LONGEST, LONGEST), np.int64), np.empty(
-        (LONGEST, LONGEST), np.int64
+    best, first, second = (
+        np.empty((LONGEST, LONGEST)),
+        np.empty((LONGEST, LONGEST), np.int64),
+        np.empty((LONGEST, LONGEST), np.int64),
     )
     new_id = np.empty(canvas.quads.shape[0], np.int64)
     done = 0
     for q in range(len(net.quads)):
         if net.quads[q, 0] < 0 or quad_quality(net.points, net.quads, q) >= below:
             continue
-        chosen, chosen_trial, chosen_kind = LEAST_GAIN, -1, -1
-        for trial in range(6):
+        chosen, chosen_trial, chosen_kind = LEAST_GAIN, np.int64(-1), np.int64(-1)
+        for trial in range(COLLAPSE + 2):
             if not _grow(net, cavity, q, trial):
                 continue
             worst = _worst_member(net, cavity)
             for kind in range(3):
-                gain = min(_try(net, cavity, canvas, kind, best, first, second), below) - worst
+                gain = min(_try(net, cavity, canvas, q, trial, kind, best, first, second), below) - worst
                 if gain > chosen:
                     chosen, chosen_trial, chosen_kind = gain, trial, kind
         if chosen_trial < 0:
             continue
         _grow(net, cavity, q, chosen_trial)
-        _try(net, cavity, canvas, chosen_kind, best, first, second)
+        _try(net, cavity, canvas, q, chosen_trial, chosen_kind, best, first, second)
         if _rings_have_room(net, cavity, canvas):
             face = net.face[cavity.members[0]]
             remove(net, cavity)
