@@ -13,7 +13,7 @@ from imgquad_core.writers.common import refuse_3d, refuse_cohesive, replacing, r
 
 
 def write_obj(mesh: FEMesh, path: str | Path) -> None:
-    """Write a Wavefront file (``.obj``): quads, a group and a material for each material, with its colour (``.mtl``)."""
+    """Write a Wavefront file (``.obj``): quads, a group for each material, the colours in a ``.mtl`` beside it."""
     points, quads = _corners(mesh, "OBJ")
     library = Path(path).with_suffix(".mtl")
     write_text(library, _mtl(mesh))

@@ -497,6 +497,15 @@ def test_command_lists_filters_and_prints_scripts(tmp_path: Path, capsys: pytest
 
 
 @needs_meshlab
+def test_script_in_the_readme_runs(tmp_path: Path) -> None:
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    (tmp_path / "smooth.mlx").write_text(page.split("```xml\n")[1].split("```")[0], encoding="utf-8")
+    result = run_script(tmp_path / "smooth.mlx", image=LABELS, output=tmp_path / "mesh.obj")
+    assert [s.program for s in result.steps] == ["imgquad-mesh", "MeshLab", "MeshLab", "imgquad-mesh"]
+    assert result.mesh is not None
+
+
+@needs_meshlab
 def test_script_in_the_docs_runs(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "meshlab.md").read_text(encoding="utf-8")
     (tmp_path / "rock.mlx").write_text(page.split("```xml\n")[1].split("```")[0], encoding="utf-8")
