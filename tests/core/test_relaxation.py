@@ -75,6 +75,16 @@ def test_laplace_keeps_rings_above_its_guard_or_what_they_had(seed: int) -> None
     assert mean[1] > mean[0]
 
 
+@pytest.mark.parametrize("name", MOVES)
+def test_thin_bend_is_not_cut_short(name: str) -> None:
+    # the mean of the neighbours along the bend lies beyond its inner side
+    mesh = grid(5, 2)
+    turn, radius = np.radians(55 * mesh.points[:, 0]), 1 + 0.1 * mesh.points[:, 1]
+    bent = mesh._replace(points=np.stack([-radius * np.cos(turn), radius * np.sin(turn)], axis=1))
+    assert naive.worst_quality(bent.points, bent.quads) > 0.5
+    assert naive.worst_quality(moved(bent, MOVES[name]), bent.quads) > 0.5
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_newton_lowers_the_energy(seed: int) -> None:
     mesh = rough(seed)
