@@ -26,6 +26,7 @@ from .model import BoundaryGraph, Materials, PointKind, QuadMesh
 from .outline import Flags, Outline, chains_of, coarse_segments, halved, outline, wide_faces, with_short_chains_halved
 from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
 from .repair import repair
+from .sliding import slide
 from .splitting import INNER_VALENCE, FaceQuads, middles_of, split_composed, split_quads
 from .topology import CleanUp, clean_up
 from .triangulation import Triangles, constraint_table, triangulate
@@ -47,12 +48,13 @@ class Effort(NamedTuple):
     wide: CleanUp  #: clean-up of faces on level 2
     narrow: CleanUp  #: clean-up of faces on level 1
     again_below: float  #: a face on level 2 with a worse element is meshed on level 1 as well
+    slides: int  #: rounds in which boundary nodes slide along their chains
 
 
 EFFORTS: Mapping[str, Effort] = {
-    "fast": Effort(CleanUp((16, 40), 0.2, 0.6), CleanUp((16,), 0.2, 0.6), 0.4),
-    "normal": Effort(CleanUp((40, 160), 0.5, 0.6), CleanUp((16, 40, 80), 0.5, 0.6), 0.5),
-    "best": Effort(CleanUp((16, 40, 80, 160, 160), 1.0, 0.6), CleanUp((16, 40, 80, 160), 1.0, 0.6), 0.5),
+    "fast": Effort(CleanUp((16, 40), 0.2, 0.6), CleanUp((16,), 0.2, 0.6), 0.4, 0),
+    "normal": Effort(CleanUp((40, 160), 0.5, 0.6), CleanUp((16, 40, 80), 0.5, 0.6), 0.5, 2),
+    "best": Effort(CleanUp((16, 40, 80, 160, 160), 0.8, 0.6), CleanUp((16, 40, 80, 160), 1.0, 0.6), 0.5, 4),
 }
 
 
@@ -144,7 +146,8 @@ def mesh_boundaries(
     for _ in range(REFITS):
         parts, stuck = _mesh_faces(graph, options)
         if len(stuck) == 0:
-            return _stitch(graph, parts, materials or _materials_of(graph.region_label))
+            mesh = _stitch(graph, parts, materials or _materials_of(graph.region_label))
+            return _slid(mesh, EFFORTS[options.effort].slides)
         graph = _on_chords(graph, stuck)
     raise TopologyError(f"{len(stuck)} boundary points fold quads, the first at {graph.points[stuck[0]].tolist()}")
 
@@ -334,6 +337,16 @@ def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) 
         graph.chain_regions,
         materials,
     )
+
+
+def _slid(mesh: QuadMesh, rounds: int) -> QuadMesh:
+    """Let boundary nodes slide, and the nodes inside follow."""
+    points, at = mesh.points.copy(), np.zeros(mesh.n_points)
+    rings, free = rings_of(mesh.quads, mesh.n_points), mesh.point_kind == PointKind.INTERIOR
+    for _ in range(rounds):
+        slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, mesh.points, at)
+        newton(points, rings, free, 2, GOOD)
+    return replace(mesh, points=points)
 
 
 def _materials_of(labels: NDArray[np.int32]) -> Materials:

@@ -156,7 +156,7 @@ def _corner_energy(
 
 
 @kernel
-def _ring_energy(points: Points, rings: Rings, v: int, out: Points) -> None:
+def ring_energy(points: Points, rings: Rings, v: int, out: Points) -> None:
     """Sum energy and derivatives of the three corners of each ring quad that node v is part of, into `out` (6,)."""
     out[:] = 0.0
     for i in range(rings.offsets[v], rings.offsets[v + 1]):
@@ -202,7 +202,7 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             before = ring_quality(points, rings, v)
             if before >= good:
                 continue
-            _ring_energy(points, rings, v, now)
+            ring_energy(points, rings, v, now)
             if not np.isfinite(now[0]) or now[0] == 0.0:
                 continue
             dx, dy = _newton_step(now)
@@ -212,7 +212,7 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             reach = abs(points[w, 0] - x) + abs(points[w, 1] - y)
             for _ in range(HALVINGS):
                 points[v, 0], points[v, 1] = x + dx, y + dy
-                _ring_energy(points, rings, v, then)
+                ring_energy(points, rings, v, then)
                 if then[0] < now[0] and ring_quality(points, rings, v) >= min(before, GUARD):
                     break  # the energy alone would pay for length with angles
                 points[v, 0], points[v, 1] = x, y
