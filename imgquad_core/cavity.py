@@ -235,7 +235,7 @@ def _trace_outline(net: Net, cavity: Cavity) -> bool:
     """Trace the outline and find its corners; return whether it is one loop."""
     count = cavity.count
     total = count[RIM_EDGES]
-    start = np.int64(-1)
+    start: Any = np.int64(-1)
     for i in range(count[MEMBERS] - 1, -1, -1):
         for k in range(4):
             if start < 0 and cavity.leaving[net.quads[cavity.members[i], k]] > 0:

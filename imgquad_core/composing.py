@@ -12,6 +12,8 @@ pairs are those of the layers. Triangles that stay single are split into three q
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -95,7 +97,8 @@ def _augment(mate: Ids, twins: Ids, quality: Points) -> int:
     for t in range(mate.size):
         if mate[t] >= 0:
             continue
-        best, best_ta, best_bu = WORST_AUGMENTED, np.int64(-1), np.int64(-1)
+        none: Any = np.int64(-1)
+        best, best_ta, best_bu = WORST_AUGMENTED, none, none
         for ta in range(3 * t, 3 * t + 3):
             if twins[ta] < 0 or max(quality[ta], quality[twins[ta]]) < best:
                 continue
@@ -109,7 +112,7 @@ def _augment(mate: Ids, twins: Ids, quality: Points) -> int:
                     continue
                 worst = min(max(quality[ta], quality[twins[ta]]), max(quality[bu], quality[twins[bu]]))
                 if worst > best:
-                    best, best_ta, best_bu = worst, ta, bu  # type: ignore[assignment]
+                    best, best_ta, best_bu = worst, ta, bu
         if best_ta >= 0:
             for h in (best_ta, best_bu):
                 mate[h // 3] = h

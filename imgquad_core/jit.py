@@ -13,7 +13,8 @@ _KERNELS: list[Any] = []
 
 def kernel(function: F) -> F:
     """Compile `function` without the interpreter, release the GIL while it runs, keep the machine code on disk."""
-    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    flags: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    compiled: Any = numba.njit(**flags)(function)
     _KERNELS.append(compiled)
     return compiled  # type: ignore[no-any-return]
 

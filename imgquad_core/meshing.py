@@ -83,7 +83,8 @@ class MeshingOptions:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        for name, value in {"size": self.size, **{f"size of material {k}": v for k, v in self._sizes().items()}}.items():
+        sizes = {"size": self.size} | {f"size of material {k}": v for k, v in self._sizes().items()}
+        for name, value in sizes.items():
             if not 0.05 <= value < float("inf"):
                 raise InputError(f"{name} is {value}; give a length of at least 0.05 px")
         if not 1.01 <= self.growth <= 10.0:
@@ -304,7 +305,7 @@ def _bounds_any(graph: BoundaryGraph, points: Ids, faces: Flags) -> Flags:
     """Return for each point whether its chain bounds a flagged face (points inside chains only)."""
     chain_of = np.zeros(len(graph.points), np.int64)
     chain_of[graph.chain_points] = np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets))
-    return chains_of(graph, faces)[chain_of[points]]
+    return np.asarray(chains_of(graph, faces)[chain_of[points]])
 
 
 def _on_chords(graph: BoundaryGraph, points: Ids) -> BoundaryGraph:

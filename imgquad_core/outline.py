@@ -58,7 +58,7 @@ def coarse_segments(graph: BoundaryGraph, chains: Flags, stride: int) -> Segment
 def chains_of(graph: BoundaryGraph, faces: Flags) -> Flags:
     """Return which chains bound a flagged face (region)."""
     padded = np.append(faces, False)  # VOID is the last entry
-    return padded[graph.chain_regions].any(axis=1)
+    return np.asarray(padded[graph.chain_regions].any(axis=1))
 
 
 def outline(graph: BoundaryGraph, faces: Flags, stride: int) -> Outline:
@@ -133,7 +133,7 @@ def _width(graph: BoundaryGraph, segments: Segments, length: Points) -> Points:
     around = _per_face(graph, np.bincount(segments.chain, length, graph.n_chains))
     count = _per_face(graph, np.bincount(segments.chain, minlength=graph.n_chains))
     edge = around / np.maximum(count, 1)
-    return 4.0 * graph.region_pixels / np.maximum(around * edge, 1e-9)
+    return np.asarray(4.0 * graph.region_pixels / np.maximum(around * edge, 1e-9))
 
 
 def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
@@ -165,4 +165,4 @@ def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
 def _on_frame(points: Points, shape: tuple[int, int]) -> Flags:
     rows, cols = shape
     x, y = points.T
-    return (x == 0) | (x == cols) | (y == 0) | (y == rows)
+    return np.asarray((x == 0) | (x == cols) | (y == 0) | (y == rows))

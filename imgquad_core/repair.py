@@ -1,8 +1,8 @@
 """Replace the worst quads: best quads for a small outline, whatever the valences.
 
 Around a poor quad a few small cavities are tried. Their outlines (an even number of nodes) are filled either without
-any new node, by the quads whose worst scaled Jacobian is largest (dynamic programming over the outline), or by a star; or the poor
-quad is collapsed:
+any new node, by the quads whose worst scaled Jacobian is largest (dynamic programming over the outline), or by a
+star; or the poor quad is collapsed:
 
     b----c         b----c
     |    |        / \\    \\        the quad i a b j splits an outline into three shorter ones;
@@ -12,6 +12,8 @@ quad is collapsed:
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -249,7 +251,8 @@ def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float) -> int:
     for q in range(len(net.quads)):
         if net.quads[q, 0] < 0 or quad_quality(net.points, net.quads, q) >= below:
             continue
-        chosen, chosen_trial, chosen_kind = LEAST_GAIN, np.int64(-1), np.int64(-1)
+        none: Any = np.int64(-1)
+        chosen, chosen_trial, chosen_kind = LEAST_GAIN, none, none
         for trial in range(COLLAPSE + 2):
             if not _grow(net, cavity, q, trial):
                 continue

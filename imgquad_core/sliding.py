@@ -22,7 +22,9 @@ _FREE, _FRAME = int(PointKind.FREE), int(PointKind.FRAME)
 
 
 @kernel
-def slide(points: Points, rings: Rings, kind: NDArray[np.uint8], offsets: Ids, ids: Ids, chain: Points, at: Points) -> None:
+def slide(
+    points: Points, rings: Rings, kind: NDArray[np.uint8], offsets: Ids, ids: Ids, chain: Points, at: Points
+) -> None:
     """Move each boundary node once to where the energy of its ring is least, in place.
 
     `chain` holds the places of the nodes before any slide, `at` how far each has gone (t), which is kept up to date.

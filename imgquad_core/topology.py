@@ -10,7 +10,7 @@ Rim nodes (on constraints) never move and never vanish; `wanted` tells how many 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,7 +204,8 @@ def _remesh_around(
     """Grow a cavity around node `seed` and remesh it; return whether that was done."""
     begin(cavity)
     add_ring(net, cavity, seed)
-    last_gain, last_size = np.int64(0), np.int64(0)  # typed: a literal would compile the callee once more
+    zero: Any = np.int64(0)  # typed: a literal would compile the callee once more
+    last_gain, last_size = zero, zero
     while settle(net, cavity, largest, FLAT):
         kind, gain = _choose(net, cavity, cut, last_gain, last_size)
         if kind != NONE:
