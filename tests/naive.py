@@ -34,7 +34,7 @@ def corner_sines(points: Points, quads: Ids) -> Points:
     """Sine of each corner angle of each quad, shape (n, 4)."""
     p = points[quads]
     a, b = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
-    sines: Points = (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]) / np.sqrt((a**2).sum(-1) * (b**2).sum(-1))
+    sines: Points = (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]) / np.sqrt((a**2).sum(-1) * (b**2).sum(-1) + 1e-300)
     return sines
 
 
@@ -61,6 +61,20 @@ def best_quads(points: Points) -> float:
         return float(max(ways))
 
     return best(0, len(points) - 1)
+
+
+def best_star(points: Points, steps: int = 40) -> float:
+    """Worst scaled Jacobian of the best way to join every second node of a polygon to one in it, tried on a grid."""
+    n = len(points)
+    worst = -1.0
+    for x in np.linspace(*np.quantile(points[:, 0], [0, 1]), steps):
+        for y in np.linspace(*np.quantile(points[:, 1], [0, 1]), steps):
+            with_centre = np.vstack([points, [[x, y]]])
+            for first in (0, 1):
+                i = np.arange(first, n, 2)
+                quads = np.stack([i, (i + 1) % n, (i + 2) % n, np.full(len(i), n)], axis=1)
+                worst = max(worst, worst_quality(with_centre, quads))
+    return worst
 
 
 def shape_energy(points: Points, quads: Ids, power: int = 4) -> float:

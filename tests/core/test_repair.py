@@ -65,6 +65,15 @@ def test_star_takes_over_where_nodes_alone_do_not_do() -> None:
     assert new.wanted[6] == 4
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_centre_of_the_star_is_about_the_best(seed: int) -> None:
+    turn = 2 * np.pi * np.arange(6) / 6
+    shape = np.stack([np.cos(turn), np.sin(turn)], axis=1) * np.tile([[1.0], [0.6]], (3, 1))
+    shape[seed] *= 1.6
+    new = repair(only(shape, fans(6)), 1.0)
+    assert worst(new) >= max(naive.best_star(shape), naive.best_quads(shape)) - 0.02
+
+
 def test_good_mesh_is_returned_as_it_is() -> None:
     mesh = grid(6, 5, 0.1)
     assert repair(mesh, 0.5) is mesh
