@@ -270,7 +270,8 @@ def _recut(graph: BoundaryGraph, sides: tuple[_Side, _Side], cuts: list[Floats])
             points.append(new)
             chains[c] = np.concatenate([[first], n + np.arange(len(new)), [last]])
             n += len(new)
-    kinds = np.concatenate([graph.point_kind, np.full(n - len(graph.points), PointKind.FRAME, np.uint8)])
+    # of the kind that stays: nodes of kind FRAME slide along the border when the mesh is relaxed
+    kinds = np.concatenate([graph.point_kind, np.full(n - len(graph.points), PointKind.CORNER, np.uint8)])
     return _with_chains(replace(graph, points=np.concatenate(points), point_kind=kinds), chains)
 
 

@@ -15,9 +15,11 @@ from imgquad_core.writers.common import refuse_3d, refuse_cohesive, replacing, r
 def write_obj(mesh: FEMesh, path: str | Path) -> None:
     """Write a Wavefront file (``.obj``): quads, a group for each material, the colours in a ``.mtl`` beside it."""
     points, quads = _corners(mesh, "OBJ")
-    library = Path(path).with_suffix(".mtl")
-    write_text(library, _mtl(mesh))
-    write_text(path, _obj(mesh, points, quads, library.name))
+    with replacing(path) as temporary:
+        library = temporary.with_suffix(".mtl")
+        for file, parts in ((library, _mtl(mesh)), (temporary, _obj(mesh, points, quads, library.name))):
+            with file.open("w", encoding="utf-8", newline="\n") as stream:
+                stream.writelines(parts)
 
 
 def write_off(mesh: FEMesh, path: str | Path) -> None:
