@@ -28,7 +28,7 @@ from imgquad_core.stretching import stretch
 
 _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign points that both move it cannot meet
 _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for areas
-_NARROW = 2.0  # px; reach of the local feature size that bounds shifts
+_NARROW = 2.0  # px; least reach of the local feature size that bounds shifts
 _ARC_RATIO = 2.0  # arc over distance of a foreign point of the pixel boundary
 
 
@@ -135,7 +135,8 @@ def _asked_sizes(graph: BoundaryGraph, options: SmoothingOptions) -> Floats:
 
 def _room(curves: Curves, is_corner: Flags, max_shift: float) -> Floats:
     """How far smoothing may move each dense point."""
-    free = _ROOM * local_feature_size(curves.raw, curves, _NARROW, _ARC_RATIO)
+    reach = max(_NARROW, max_shift / _ROOM)
+    free = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO)
     return np.asarray(np.minimum(free, np.where(is_corner, 1.0, _SHARE) * max_shift))
 
 
