@@ -162,12 +162,14 @@ def restore_areas_freely(
     placed = nodes.placed
     bound = _area_bounds(draft.curves, nodes, room, max_shift)
     shift, tested = np.zeros(graph.n_chains), nodes.points
+    had_conflicts = np.zeros(graph.n_chains, bool)
     for attempt in range(_AREA_ROUNDS):
         points, shift = restore_areas(
             nodes.points, nodes.chain_points, placed.offsets, graph.chain_regions, graph.region_pixels, bound, shift
         )
         points = snapped(points)
         has_moved = any_of_chain((points != tested).any(axis=1)[nodes.chain_points], placed.offsets)
+        has_moved |= had_conflicts
         is_bad = np.zeros(len(points), bool)
         for level in (level_of(nodes, 2), level_of(nodes, 1)):
             marks = mark_conflicts(points, level, draft.ends, has_moved, gently, draft.shape)
@@ -175,7 +177,7 @@ def restore_areas_freely(
         if not is_bad.any():
             return nodes._replace(points=points)
         bound[_widened(is_bad[nodes.chain_points])] *= 0.5 if attempt == 0 else 0.0
-        tested = points
+        tested, had_conflicts = points, any_of_chain(is_bad[nodes.chain_points], placed.offsets)
     return nodes
 
 
