@@ -28,6 +28,10 @@ class MeshSetLayers:
         """Add a layer, make it the current one, return its id."""
         return add_to(self._meshset, layer)
 
+    def set_current(self, mesh: int) -> None:
+        """Make another layer the current one."""
+        self._meshset.set_current_mesh(mesh)
+
     def layer(self, mesh: int | None = None) -> Layer:
         """Return the current layer, or the one with this id."""
         return layer_of(self._meshset.current_mesh() if mesh is None else self._meshset.mesh(mesh))

@@ -184,6 +184,7 @@ class MeshLabProcess:
     def set_current(self, mesh: int) -> None:
         """Make another layer the current one."""
         self.ask("set_current", mesh=mesh)
+        self._keep()
 
     def export(self, path: Path) -> None:
         """Save the current layer with MeshLab, in the format that the extension names."""

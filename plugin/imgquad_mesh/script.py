@@ -204,11 +204,12 @@ class _Runner:
         return self.process
 
     def _move_layers(self, process: MeshLabProcess) -> None:
-        former, made = self.state.meshes, {}
-        for mesh in former.layers[0]:
-            number = process.add(former.layer(mesh))
-            if mesh in self.state.made:
-                made[number] = self.state.made[mesh]
+        former = self.state.meshes
+        ids, current = former.layers
+        numbers = {mesh: process.add(former.layer(mesh)) for mesh in ids}
+        made = {numbers[mesh]: quads for mesh, quads in self.state.made.items()}
+        if current is not None:
+            process.set_current(numbers[current])
         self.state.meshes, self.state.made = process, made
 
     def _last_good(self) -> Layer | None:

@@ -24,6 +24,9 @@ class Meshes(Protocol):
     def add(self, layer: Layer) -> int:
         """Add a layer, make it the current one, return its id."""
 
+    def set_current(self, mesh: int) -> None:
+        """Make another layer the current one."""
+
     def layer(self, mesh: int | None = None) -> Layer:
         """Return the current layer, or the one with this id."""
 
@@ -43,32 +46,37 @@ class LayerList:
 
     def __init__(self) -> None:
         self._layers: list[Layer] = []
+        self._current = 0
 
     def add(self, layer: Layer) -> int:
         """Add a layer, make it the current one, return its id."""
         self._layers.append(layer)
-        return len(self._layers) - 1
+        self._current = len(self._layers) - 1
+        return self._current
+
+    def set_current(self, mesh: int) -> None:
+        """Make another layer the current one."""
+        self._current = mesh
 
     def layer(self, mesh: int | None = None) -> Layer:
         """Return the current layer, or the one with this id."""
-        return self._layers[-1 if mesh is None else mesh]
+        return self._layers[self._current if mesh is None else mesh]
 
     def put(self, layer: Layer) -> int:
         """Put a layer in the place of the current one, return its id."""
-        self._layers[-1] = layer
-        return len(self._layers) - 1
+        self._layers[self._current] = layer
+        return self._current
 
     def give(self, do: str, values: NDArray[Any]) -> None:
         """Set points (``move``), a value a face (``set_scalar``) or a colour a face (``set_color``), in place."""
         part = {"move": "points", "set_scalar": "face_scalar", "set_color": "face_color"}[do]
         changed: dict[str, Any] = {part: values}
-        self._layers[-1] = replace(self._layers[-1], **changed)
+        self._layers[self._current] = replace(self._layers[self._current], **changed)
 
     @property
     def layers(self) -> tuple[list[int], int | None]:
         """Ids of all layers and of the current one."""
-        n = len(self._layers)
-        return list(range(n)), n - 1 if n else None
+        return list(range(len(self._layers))), self._current if self._layers else None
 
 
 @dataclass

@@ -210,6 +210,17 @@ def _quality_per_face(state: State, options: QualityOptions) -> dict[str, Any]:
     return {"min": float(values.min()), "max": float(values.max()), "avg": float(values.mean())}
 
 
+def _boundaries_of_mesh(state: State, options: NoOptions) -> dict[str, Any]:
+    mesh = state.mesh()
+    used, ends = np.unique(mesh.constraints, return_inverse=True)
+    layer = polyline(mesh.points[used], ends.reshape(-1, 2), label="boundaries of the quad mesh")
+    _, current = state.meshes.layers
+    state.meshes.add(layer)
+    if current is not None:
+        state.meshes.set_current(current)
+    return {"chains_number": len(mesh.chain_offsets) - 1, "edges_number": len(mesh.constraints)}
+
+
 def _color_per_face(state: State, options: NoOptions) -> dict[str, Any]:
     layer = state.meshes.layer()
     materials = state.labels.materials if state.labels else None
@@ -297,6 +308,7 @@ STEPS: Mapping[str, Step] = {
     "generate_quad_mesh_from_image": Step(MeshOptions, _mesh_image),
     "meshing_quad_cleanup": Step(OptimizationOptions, _optimize),
     "compute_scalar_by_quad_quality_per_face": Step(QualityOptions, _quality_per_face),
+    "generate_polyline_from_quad_mesh": Step(NoOptions, _boundaries_of_mesh),
     "compute_color_by_material_per_face": Step(NoOptions, _color_per_face),
     "get_quad_quality_measures": Step(NoOptions, _measure_quality),
     "get_material_statistics": Step(NoOptions, _measure_materials),

@@ -118,6 +118,7 @@ def test_materials_are_cropped_dropped_and_sized_by_name(tmp_path: Path) -> None
         filter_xml("Image: Drop Materials", 'name="drop" type="RichString" value="material 3"'),
         filter_xml("Boundary: Smooth", 'name="materialSizes" type="RichString" value="material 0=2"'),
         filter_xml("Quad Mesh: From Material Boundaries", 'name="materialSizes" type="RichString" value="0=2"'),
+        filter_xml("Quad Mesh: Extract Boundaries"),
         filter_xml("Compute Material Statistics"),
         filter_xml("Compute Quad Mesh Sets"),
     )
@@ -127,6 +128,10 @@ def test_materials_are_cropped_dropped_and_sized_by_name(tmp_path: Path) -> None
     assert statistics["material 0"]["area"] == pytest.approx(24 * 20 - 144, rel=1e-3)
     assert statistics["material 0"]["quads_number"] > 60
     assert result.values("get_quad_mesh_sets")["nodes"]
+    assert len(result.layers) == 4  # two of boundaries, the mesh, its boundaries
+    assert result.mesh is not None
+    assert len(result.layers[3].edges) == len(result.mesh.constraints)
+    assert result.current is result.layers[2]
 
 
 def test_files_are_written_beside_the_script(tmp_path: Path) -> None:
