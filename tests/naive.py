@@ -65,10 +65,10 @@ def best_quads(points: Points) -> float:
 
 def best_star(points: Points, steps: int = 40) -> float:
     """Worst scaled Jacobian of the best way to join every second node of a polygon to one in it, tried on a grid."""
-    n = len(points)
+    n, low, high = len(points), points.min(axis=0), points.max(axis=0)
     worst = -1.0
-    for x in np.linspace(*np.quantile(points[:, 0], [0, 1]), steps):
-        for y in np.linspace(*np.quantile(points[:, 1], [0, 1]), steps):
+    for x in np.linspace(low[0], high[0], steps):
+        for y in np.linspace(low[1], high[1], steps):
             with_centre = np.vstack([points, [[x, y]]])
             for first in (0, 1):
                 i = np.arange(first, n, 2)
