@@ -14,7 +14,9 @@ from imgquad_core.model import VOID, Materials, PointKind, QuadMesh
 SHARP = np.cos(np.radians(50.0))  #: a boundary that turns more at a node has a corner there
 
 
-def trace_mesh(points: ArrayLike, quads: ArrayLike, material: ArrayLike, materials: Materials) -> QuadMesh:
+def trace_mesh(
+    points: ArrayLike, quads: ArrayLike, material: ArrayLike, materials: Materials, *, folded: bool = False
+) -> QuadMesh:
     """Return the mesh of `quads` with its boundaries.
 
     Parameters
@@ -27,6 +29,8 @@ def trace_mesh(points: ArrayLike, quads: ArrayLike, material: ArrayLike, materia
         Material of each quad.
     materials : Materials
         Their names.
+    folded : bool
+        Whether quads may lie folded over, their neighbours' edges run the other way all the same.
 
     Returns
     -------
@@ -38,7 +42,8 @@ def trace_mesh(points: ArrayLike, quads: ArrayLike, material: ArrayLike, materia
     InputError
         A quad that turns the wrong way or has no area, or an edge of more than two quads.
     """
-    xy, corners = np.asarray(points, np.float64), _counter_clockwise(np.asarray(points), np.asarray(quads, np.int64))
+    xy = np.asarray(points, np.float64)
+    corners = _counter_clockwise(xy, np.asarray(quads, np.int64), folded)
     label = np.asarray(material, np.int32)
     twin = half_edge_twins(corners, len(xy))
     _assert_manifold(corners, len(xy))
@@ -65,12 +70,12 @@ def trace_mesh(points: ArrayLike, quads: ArrayLike, material: ArrayLike, materia
     )
 
 
-def _counter_clockwise(points: Floats, quads: Ints) -> Ints:
+def _counter_clockwise(points: Floats, quads: Ints, folded: bool) -> Ints:
     x, y = points[quads, 0], points[quads, 1]
     area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
-    if (area < 0).all():
+    if (area < 0).all() or (folded and area.sum() < 0):
         return np.ascontiguousarray(quads[:, ::-1])
-    if (area <= 0).any():
+    if (area <= 0).any() and not folded:
         bad = int(np.argmax(area <= 0))
         raise InputError(
             f"quad {bad} turns clockwise or has no area while others turn counter-clockwise: mend the mesh"

@@ -77,4 +77,4 @@ def to_mesh(grid: pv.UnstructuredGrid | pv.PolyData) -> tuple[QuadMesh, Placemen
     for name in FIELDS:
         if name in grid.field_data:
             level.field_data[name] = grid.field_data[name]
-    return from_grid(level), plane
+    return from_grid(level, folded=True), plane

@@ -59,8 +59,8 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
     write_mesh(make_elements(from_grid(dataset), elements), path, **options)
 
 
-def from_grid(dataset: Any) -> QuadMesh:
-    """Return the mesh in a flat grid of quads; the inverse of `imgquad_mesh.convert.to_grid`."""
+def from_grid(dataset: Any, *, folded: bool = False) -> QuadMesh:
+    """Return the mesh in a flat grid of quads, the inverse of `imgquad_mesh.convert.to_grid`; see `trace_mesh`."""
     from imgquad_core.tracing import trace_mesh
 
     points = np.asarray(dataset.points, np.float64)
@@ -70,7 +70,8 @@ def from_grid(dataset: Any) -> QuadMesh:
     used, numbered = np.unique(quads, return_inverse=True)
     cell_data = dataset.cell_data
     material = np.asarray(cell_data["material"]) if "material" in cell_data else np.zeros(len(quads), np.int32)
-    return trace_mesh(points[used, :2], numbered.reshape(-1, 4), material, _materials(dataset, material))
+    corners, materials = numbered.reshape(-1, 4), _materials(dataset, material)
+    return trace_mesh(points[used, :2], corners, material, materials, folded=folded)
 
 
 def to_fe_grid(mesh: FEMesh) -> pv.UnstructuredGrid:

