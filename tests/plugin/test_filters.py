@@ -9,6 +9,7 @@ import pytest
 import pyvista as pv
 from pyvista.core.errors import AmbiguousDataError, MissingDataError
 
+from imgquad_core import MeshOptions, mesh_image
 from imgquad_core.errors import InputError
 from imgquad_mesh import filters
 from pictures import COLS, ROWS, areas, assert_same, labels, photo, point_image
@@ -39,6 +40,15 @@ def test_chain_with_every_option_gives_the_mesh_to_the_bit() -> None:
     smoothed = filters.smooth(lines, 2.0, growth=1.2, edge_ratio=1.3, max_shift=0.5, **sizes)
     assert_same(filters.quads(smoothed, effort="fast"), whole)
     assert set(whole["material"]) == {0, 2}
+
+
+@pytest.mark.parametrize("picture", [labels(), photo()], ids=["labels", "photo"])
+def test_mesh_is_that_of_the_pipeline(picture: np.ndarray) -> None:
+    made = mesh_image(picture, MeshOptions(size=3, material_sizes={1: 2}, periodic="x", drop=(2,)))
+    grid = point_image(picture).imgquad.mesh(size=3, material_sizes={1: 2}, periodic="x", drop=[2])
+    assert np.array_equal(grid.cells_dict[pv.CellType.QUAD], made.quads)
+    assert np.array_equal(np.asarray(grid.points)[:, :2], made.points - 0.5)
+    assert np.array_equal(grid["material"], made.quad_material)
 
 
 def test_files_between_the_filters_change_nothing(tmp_path: Path) -> None:
