@@ -28,7 +28,6 @@ from .jit import kernel
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
 
-NONE, WHOLE, CUT = 0, 1, 2
 MAX_CORNERS = 6
 
 
@@ -134,11 +133,18 @@ def piece_quads(length: Ids, n: int) -> int:
 
 @kernel
 def cut_quads(length: Ids, n: int, cut: Ids) -> int:
-    """Number of quads in both pieces of a cut."""
+    """Number of quads in both pieces of a cut, or in the one pattern where the cut has no edge."""
     one, two = np.empty(MAX_CORNERS + 2, np.int64), np.empty(MAX_CORNERS + 2, np.int64)
-    _cut_sides(length, n, cut[0], cut[1], cut[2], cut[3], cut[4], one, two)
-    pieces = cut[1] - cut[0] + 2
-    return piece_quads(one, pieces) + piece_quads(two, n + 4 - pieces)
+    pieces, corners, total = 1, n, 0
+    if cut[4] > 0:
+        _cut_sides(length, n, cut[0], cut[1], cut[2], cut[3], cut[4], one, two)
+        pieces, corners = 2, cut[1] - cut[0] + 2
+    else:
+        one = length
+    for piece in range(pieces):  # one call for both: a kernel is compiled anew at every call of it
+        total += piece_quads(one if piece == 0 else two, corners)
+        corners = n + 4 - corners
+    return total
 
 
 @kernel
@@ -232,27 +238,28 @@ def draw_piece(canvas: Canvas, length: Ids, n: int) -> None:
 
 @kernel
 def draw_cut(canvas: Canvas, loop: Ids, corner: Ids, length: Ids, n: int, cut: Ids) -> None:
-    """Draw both pieces of a cut (i, j, a, b, l)."""
+    """Draw both pieces of a cut (i, j, a, b, l), or the one pattern where the cut has no edge (l = 0)."""
     i, j, a, b, l = cut[0], cut[1], cut[2], cut[3], cut[4]
     one, two = np.empty(MAX_CORNERS + 2, np.int64), np.empty(MAX_CORNERS + 2, np.int64)
-    _cut_sides(length, n, i, j, a, b, l, one, two)
     n_loop = 0
     for k in range(n):
         n_loop += length[k]
-    u, w = (corner[i] + a) % n_loop, (corner[j % n] + b) % n_loop
-    draw_line(canvas, loop[u], loop[w], l, canvas.line, 0)
-    around = (w - u + n_loop) % n_loop
-    for k in range(around + 1):
-        canvas.poly[k] = loop[(u + k) % n_loop]
-    for k in range(1, l):
-        canvas.poly[around + k] = canvas.line[l - k]
-    draw_piece(canvas, one, j - i + 2)
-    around = n_loop - around
-    for k in range(around + 1):
-        canvas.poly[k] = loop[(w + k) % n_loop]
-    for k in range(1, l):
-        canvas.poly[around + k] = canvas.line[k]
-    draw_piece(canvas, two, n - (j - i) + 2)
+    if l > 0:
+        _cut_sides(length, n, i, j, a, b, l, one, two)
+        pieces, corners = 2, j - i + 2
+        u, w = (corner[i] + a) % n_loop, (corner[j % n] + b) % n_loop
+        around = (w - u + n_loop) % n_loop
+        draw_line(canvas, loop[u], loop[w], l, canvas.line, 0)
+    else:
+        one, pieces, corners, u, w, around = length, 1, n, corner[0], corner[0], n_loop - 1
+    for piece in range(pieces):
+        begin = u if piece == 0 else w
+        for k in range(around + 1):
+            canvas.poly[k] = loop[(begin + k) % n_loop]
+        for k in range(1, l):
+            canvas.poly[around + k] = canvas.line[l - k if piece == 0 else k]
+        draw_piece(canvas, one if piece == 0 else two, corners)
+        around, corners = n_loop - around, n + 4 - corners
 
 
 @kernel

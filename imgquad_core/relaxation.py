@@ -277,27 +277,29 @@ def _move_towards(points: Points, rings: Rings, targets: Points, v: int) -> bool
     return False
 
 
-@kernel
 def fit_rim(points: Points, rings: Rings, on_rim: Flags, targets: Points, rounds: int) -> Flags:
     """Move rim nodes to their targets, in place, making room inside; return which of them did not get there."""
     late = on_rim.copy()
     for _ in range(rounds):
-        left = 0
-        for v in range(len(points)):
-            if late[v]:
-                late[v] = not _move_towards(points, rings, targets, v)
-                left += late[v]
-        if left == 0:
+        make_room = _approach(points, rings, late, targets)
+        if not late.any():
             break
-        make_room = np.zeros(len(points), np.bool_)
-        for v in range(len(points)):
-            if late[v]:
-                _activate_ring(make_room, rings, v)
-        for v in range(len(points)):
-            make_room[v] = make_room[v] and not on_rim[v]
+        make_room &= ~on_rim
         laplace(points, rings, make_room, 2)
         untangle(points, rings, make_room, 1, BAD)
     return late
+
+
+@kernel
+def _approach(points: Points, rings: Rings, late: Flags, targets: Points) -> Flags:
+    """Move late nodes to their targets as far as may be; return the nodes around those that are late still."""
+    around = np.zeros(len(points), np.bool_)
+    for v in range(len(points)):
+        if late[v]:
+            late[v] = not _move_towards(points, rings, targets, v)
+            if late[v]:
+                _activate_ring(around, rings, v)
+    return around
 
 
 @kernel

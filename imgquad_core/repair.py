@@ -13,8 +13,6 @@ star; or the poor quad is collapsed:
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,6 +45,7 @@ LEAST_GAIN = 0.02  # of the worst scaled Jacobian
 ANY = 99  # quads that a node of the outline may need: valences do not count here
 ROUNDS = 3
 COLLAPSE = 6  # the first of two trials that collapse the quad
+ATTEMPTS = 3 * (COLLAPSE + 2)  # three fillings of each trial's outline
 CENTRE_STEPS = 24
 
 
@@ -251,23 +250,19 @@ def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float) -> int:
     for q in range(len(net.quads)):
         if net.quads[q, 0] < 0 or quad_quality(net.points, net.quads, q) >= below:
             continue
-        none: Any = np.int64(-1)
-        chosen, chosen_trial, chosen_kind = LEAST_GAIN, none, none
-        for trial in range(COLLAPSE + 2):
-            if not _grow(net, cavity, q, trial):
+        chosen, chosen_attempt = LEAST_GAIN, -1
+        for turn in range(ATTEMPTS + 1):  # all attempts, then the best one again
+            attempt = turn if turn < ATTEMPTS else chosen_attempt
+            if attempt < 0 or not _grow(net, cavity, q, attempt // 3):
                 continue
             worst = _worst_member(net, cavity)
-            for kind in range(3):
-                gain = min(_try(net, cavity, canvas, q, trial, kind, best, first, second), below) - worst
+            gain = min(_try(net, cavity, canvas, q, attempt // 3, attempt % 3, best, first, second), below) - worst
+            if turn < ATTEMPTS:
                 if gain > chosen:
-                    chosen, chosen_trial, chosen_kind = gain, trial, kind
-        if chosen_trial < 0:
-            continue
-        _grow(net, cavity, q, chosen_trial)
-        _try(net, cavity, canvas, q, chosen_trial, chosen_kind, best, first, second)
-        if _rings_have_room(net, cavity, canvas):
-            face = net.face[cavity.members[0]]
-            remove(net, cavity)
-            insert(net, canvas, new_id, face)
-            done += 1
+                    chosen, chosen_attempt = gain, attempt
+            elif _rings_have_room(net, cavity, canvas):
+                face = net.face[cavity.members[0]]
+                remove(net, cavity)
+                insert(net, canvas, new_id, face)
+                done += 1
     return done

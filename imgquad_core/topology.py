@@ -35,20 +35,7 @@ from .cavity import (
     settle,
 )
 from .jit import kernel
-from .patterns import (
-    CUT,
-    MAX_CORNERS,
-    NONE,
-    WHOLE,
-    Canvas,
-    choose_cut,
-    cut_quads,
-    draw_cut,
-    draw_piece,
-    piece_fits,
-    piece_quads,
-    smooth_drawn,
-)
+from .patterns import MAX_CORNERS, Canvas, choose_cut, cut_quads, draw_cut, piece_fits, smooth_drawn
 from .relaxation import quad_area, quad_quality
 from .splitting import FaceQuads
 
@@ -118,20 +105,6 @@ def _mean_edge(points: Points, cavity: Cavity) -> float:
 
 
 @kernel
-def _draw(net: Net, cavity: Cavity, canvas: Canvas, kind: int, cut: Ids) -> None:
-    """Draw the chosen pattern into the cavity and smooth it."""
-    canvas.count[:] = 0
-    n_loop = cavity.count[OUTLINE]
-    if kind == CUT:
-        draw_cut(canvas, cavity.loop, cavity.corner, cavity.length, cavity.count[CORNERS], cut)
-    else:
-        for i in range(n_loop):
-            canvas.poly[i] = cavity.loop[(cavity.corner[0] + i) % n_loop]
-        draw_piece(canvas, cavity.length, cavity.count[CORNERS])
-    smooth_drawn(canvas, TRIAL_SWEEPS)
-
-
-@kernel
 def _is_better(net: Net, cavity: Cavity, canvas: Canvas, gain: int, tolerance: float, worst: float) -> bool:
     """Whether the drawn pattern may replace the cavity."""
     old_sum, old_worst, area = 0.0, 1.0, 0.0
@@ -154,10 +127,9 @@ def _is_better(net: Net, cavity: Cavity, canvas: Canvas, gain: int, tolerance: f
 
 
 @kernel
-def _has_room(net: Net, cavity: Cavity, kind: int, cut: Ids) -> bool:
+def _has_room(net: Net, cavity: Cavity, cut: Ids) -> bool:
     """Whether the pattern has about as many quads as the cavity, and mesh and rings can hold it."""
-    n = cavity.count[CORNERS]
-    quads = cut_quads(cavity.length, n, cut) if kind == CUT else piece_quads(cavity.length, n)
+    quads = cut_quads(cavity.length, cavity.count[CORNERS], cut)
     if not FEWEST * cavity.count[MEMBERS] <= quads <= MOST * cavity.count[MEMBERS]:
         return False
     if quads > net.tops[0] or quads > net.tops[1]:
@@ -170,70 +142,53 @@ def _has_room(net: Net, cavity: Cavity, kind: int, cut: Ids) -> bool:
 
 
 @kernel
-def _choose(net: Net, cavity: Cavity, cut: Ids, last_gain: int, last_size: int) -> tuple[int, int]:
-    """Return (kind of pattern, gain) for the cavity's outline; kind NONE where none helps."""
+def _choose(net: Net, cavity: Cavity, cut: Ids, last_gain: int, last_size: int) -> int:
+    """Return the gain of the best pattern for the cavity's outline, 0 where none helps; `cut` tells how it is cut."""
     n = cavity.count[CORNERS]
+    cut[4] = 0
     if n < 2 or n > MAX_CORNERS:
-        return NONE, 0
+        return 0
     whole = piece_fits(cavity.length, n)
     if not whole and n != 2 and n != 4 and n != 6:
-        return NONE, 0
+        return 0
     inner = (0 if n == 4 else 1) if whole else 2
     gain = cavity.count[COST] - _cost_then(net, cavity, inner)
     if gain <= 0 or (gain <= last_gain and cavity.count[MEMBERS] < RETRY * last_size):
-        return NONE, 0
-    if whole:
-        return WHOLE, gain
-    if choose_cut(net.points, cavity.loop, cavity.corner, cavity.length, n, _mean_edge(net.points, cavity), cut):
-        return CUT, gain
-    return NONE, 0
-
-
-@kernel
-def _remesh_around(
-    net: Net,
-    cavity: Cavity,
-    canvas: Canvas,
-    seed: int,
-    largest: int,
-    tolerance: float,
-    worst: float,
-    cut: Ids,
-    new_id: Ids,
-) -> bool:
-    """Grow a cavity around node `seed` and remesh it; return whether that was done."""
-    begin(cavity)
-    add_ring(net, cavity, seed)
-    zero: Any = np.int64(0)  # typed: a literal would compile the callee once more
-    last_gain, last_size = zero, zero
-    while settle(net, cavity, largest, FLAT):
-        kind, gain = _choose(net, cavity, cut, last_gain, last_size)
-        if kind != NONE:
-            if _has_room(net, cavity, kind, cut):
-                _draw(net, cavity, canvas, kind, cut)
-                if _is_better(net, cavity, canvas, gain, tolerance, worst):
-                    face = net.face[cavity.members[0]]
-                    remove(net, cavity)
-                    insert(net, canvas, new_id, face)
-                    return True
-            last_gain, last_size = gain, cavity.count[MEMBERS]
-        if cavity.count[CORNERS] < 2:
-            if not push_all(net, cavity):
-                return False
-        elif not push_side(net, cavity):
-            return False
-    return False
+        return 0
+    edge = _mean_edge(net.points, cavity)
+    if whole or choose_cut(net.points, cavity.loop, cavity.corner, cavity.length, n, edge, cut):
+        return int(gain)
+    return 0
 
 
 @kernel
 def _clean_pass(net: Net, cavity: Cavity, canvas: Canvas, largest: int, tolerance: float, worst: float) -> int:
     """Try a cavity of up to `largest` quads around each irregular node; return how many were remeshed."""
-    cut = np.empty(5, np.int64)
+    cut = np.zeros(5, np.int64)
     new_id = np.empty(canvas.quads.shape[0], np.int64)
     done = 0
     for v in range(len(net.valence)):
         if net.valence[v] == 0 or net.valence[v] == net.wanted[v]:
             continue
-        if _remesh_around(net, cavity, canvas, v, largest, tolerance, worst, cut, new_id):
-            done += 1
+        begin(cavity)
+        add_ring(net, cavity, v)
+        zero: Any = np.int64(0)  # typed: a literal would compile the callee once more
+        last_gain, last_size = zero, zero
+        while settle(net, cavity, largest, FLAT):
+            gain = _choose(net, cavity, cut, last_gain, last_size)
+            if gain > 0:
+                if _has_room(net, cavity, cut):
+                    canvas.count[0], canvas.count[1] = 0, 0
+                    draw_cut(canvas, cavity.loop, cavity.corner, cavity.length, cavity.count[CORNERS], cut)
+                    smooth_drawn(canvas, TRIAL_SWEEPS)
+                    if _is_better(net, cavity, canvas, gain, tolerance, worst):
+                        face = net.face[cavity.members[0]]
+                        remove(net, cavity)
+                        insert(net, canvas, new_id, face)
+                        done += 1
+                        break
+                last_gain, last_size = gain, cavity.count[MEMBERS]
+            grown = push_all(net, cavity) if cavity.count[CORNERS] < 2 else push_side(net, cavity)
+            if not grown:
+                break
     return done
