@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from imgquad_core.areas import polygon_areas, restore_areas
 from imgquad_core.clearance import CROSSING, find_conflicts, snapped
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.femesh import FEMesh, Floats, Ints
-from imgquad_core.model import VOID, BoundaryGraph, PointKind
+from imgquad_core.model import VOID, BoundaryGraph, PointKind, QuadMesh
 
 DIRECTIONS = ("x", "y", "xy")
 REACH = 3.0  #: px, a boundary that meets opposite sides within this distance is one boundary of the periodic picture
@@ -70,10 +71,63 @@ def match_opposite_sides(graph: BoundaryGraph, directions: str) -> BoundaryGraph
         lengths = [_edge_lengths(graph, side) for side in _sides(graph, across)]
         graph = _bare(graph, _sides(graph, across))
         low, high = _sides(graph, across)
+        if not len(low.ends) + len(high.ends):
+            continue  # all materials on both sides were dropped
         graph = _joined(graph, low, high)
         stations = np.unique(graph.points[np.concatenate([low.ends, high.ends]), 1 - across])
         graph = _recut(graph, (low, high), _cuts(lengths, stations))
     return _graded(_with_areas(graph, areas))
+
+
+def rematch(graph: BoundaryGraph, mesh: QuadMesh, directions: str) -> BoundaryGraph | None:
+    """Return the boundary that `mesh` has, matched anew where the mesher has cut edges of one side only.
+
+    Parameters
+    ----------
+    graph : BoundaryGraph
+        What was meshed.
+    mesh : QuadMesh
+        What came out.
+    directions : str
+        As for `match_opposite_sides`.
+
+    Returns
+    -------
+    BoundaryGraph or None
+        None where opposite sides match.
+    """
+    found = replace(
+        graph,
+        points=mesh.points,
+        point_kind=mesh.point_kind,
+        chain_offsets=mesh.chain_offsets,
+        chain_points=mesh.chain_points,
+        chain_regions=mesh.chain_regions,
+    )
+    matches = True
+    for direction in directions:
+        sides = _sides(found, "xy".index(direction))
+        shared = np.unique(np.concatenate([_heights(found, side) for side in sides]))
+        if any(_lacks(found, side, shared) for side in sides):
+            matches = False
+            found = _bare(found, sides)
+            cuts = [np.array(pair) for pair in pairwise(shared.tolist())]
+            found = _recut(found, _sides(found, "xy".index(direction)), cuts)
+    return None if matches else found
+
+
+def _heights(graph: BoundaryGraph, side: _Side) -> Floats:
+    ids = [graph.chain(c) for c in side.chains.tolist()]
+    return np.unique(graph.points[np.concatenate(ids), 1 - side.across]) if ids else np.empty(0)
+
+
+def _lacks(graph: BoundaryGraph, side: _Side, heights: Floats) -> bool:
+    """Whether a chain of the side passes one of `heights` without a node there."""
+    for c in side.chains.tolist():
+        own = graph.points[graph.chain(c), 1 - side.across]
+        if ((heights >= own.min()) & (heights <= own.max())).sum() > len(own):
+            return True
+    return False
 
 
 def _areas(graph: BoundaryGraph) -> Floats:

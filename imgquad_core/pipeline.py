@@ -18,7 +18,7 @@ from .denoise import DenoiseOptions, Removal, automatic_limits, list_removed, re
 from .errors import InputError
 from .meshing import MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
-from .periodic import DIRECTIONS, match_opposite_sides
+from .periodic import DIRECTIONS, match_opposite_sides, rematch
 from .reading import Picture, ReadOptions, read_picture
 from .segmentation import Segmentation, SegmentationOptions, segment_picture
 from .selection import Box, assert_solid, crop_image, drop_materials, material_number
@@ -250,7 +250,7 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     boundary = timed("smooth", smooth_boundaries, staircase, smoothing)
     if options.periodic != "none":
         boundary = match_opposite_sides(boundary, options.periodic)
-    mesh = timed("mesh", mesh_boundaries, boundary, meshing, labels.materials)
+    boundary, mesh = timed("mesh", _mesh, boundary, meshing, labels.materials, options.periodic)
     return Run(
         options=options,
         segmentation=found,
@@ -275,6 +275,19 @@ def read_source(source: Source, options: ReadOptions | None = None) -> Picture |
 def segment_source(source: Source, options: SegmentationOptions | None = None) -> Segmentation:
     """Read and segment a picture, and tell what was chosen."""
     return segment_picture(read_source(source), options)
+
+
+def _mesh(
+    boundary: BoundaryGraph, options: MeshingOptions, materials: Materials, periodic: str
+) -> tuple[BoundaryGraph, QuadMesh]:
+    """Mesh; where the mesher has cut edges of one side of a periodic cell only, cut the other, too, and mesh anew."""
+    mesh = mesh_boundaries(boundary, options, materials)
+    for _ in range(4 if periodic != "none" else 0):
+        again = rematch(boundary, mesh, periodic)
+        if again is None:
+            break
+        boundary, mesh = again, mesh_boundaries(again, options, materials)
+    return boundary, mesh
 
 
 class _Stopwatch:

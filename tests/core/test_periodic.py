@@ -75,6 +75,18 @@ def test_any_picture_can_be_made_periodic() -> None:
     assert len(tied.periodic["y"]) == len(tied.node_sets["top"])
 
 
+@pytest.mark.parametrize("seed", [1000, 1057, 1097, 1215])
+def test_sides_match_even_where_the_mesher_cuts_edges_of_one_side(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    k, shape = rng.integers(1, 9), rng.integers(4, 12, 2)
+    labels = rng.integers(0, rng.integers(1, 5), shape).repeat(k, 0).repeat(k, 1)
+    for directions in ("x", "xy"):
+        for drop in ((), ("0",)):
+            mesh = mesh_image(labels.astype(np.int32), MeshOptions(size=6.0, periodic=directions, drop=drop))
+            tied = with_periodic_pairs(fe_mesh(mesh), directions)
+            assert drop or all(len(pairs) > 2 for pairs in tied.periodic.values())
+
+
 def test_order_two_and_extrusion_carry_the_pairs() -> None:
     mesh = fe_mesh(staircase(wrapped_disks(1, 24, 4)))
     eight = with_periodic_pairs(second_order(mesh), "xy")
