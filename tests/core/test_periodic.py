@@ -81,10 +81,23 @@ def test_sides_match_even_where_the_mesher_cuts_edges_of_one_side(seed: int) -> 
     k, shape = rng.integers(1, 9), rng.integers(4, 12, 2)
     labels = rng.integers(0, rng.integers(1, 5), shape).repeat(k, 0).repeat(k, 1)
     for directions in ("x", "xy"):
-        for drop in ((), ("0",)):
-            mesh = mesh_image(labels.astype(np.int32), MeshOptions(size=6.0, periodic=directions, drop=drop))
-            tied = with_periodic_pairs(fe_mesh(mesh), directions)
-            assert drop or all(len(pairs) > 2 for pairs in tied.periodic.values())
+        mesh = mesh_image(labels.astype(np.int32), MeshOptions(size=6.0, periodic=directions))
+        tied = with_periodic_pairs(fe_mesh(mesh), directions)
+        assert all(len(pairs) > 2 for pairs in tied.periodic.values())
+
+
+def test_sides_of_which_a_material_was_dropped_match_where_both_are_meshed() -> None:
+    labels = np.zeros((40, 40), np.int32)
+    labels[5:20, :10] = 1
+    labels[12:30, 30:] = 1
+    mesh = mesh_image(labels, MeshOptions(size=4.0, periodic="x", drop=("1",)))
+    tied = with_periodic_pairs(fe_mesh(mesh), "x")
+    a, b = tied.points[tied.periodic["x"].T]
+    assert (a[:, 1] == b[:, 1]).all()
+    assert set(a[:, 1]) == set(tied.points[tied.node_sets["left"], 1]) & set(tied.points[tied.node_sets["right"], 1])
+    assert ((a[:, 1] <= 10) | (a[:, 1] >= 35)).all()
+    labels[:, [0, -1]] = 1  # nothing is left on both sides
+    assert mesh_image(labels, MeshOptions(size=4.0, periodic="xy", drop=("1",))).n_quads > 0
 
 
 def test_order_two_and_extrusion_carry_the_pairs() -> None:
