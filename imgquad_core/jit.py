@@ -22,7 +22,7 @@ def kernel(function: F) -> F:
 def share_on_disk() -> float:
     """Return which share of the kernels imported so far an earlier run has left on disk, from 0 to 1.
 
-    Where it is near 0 a run takes half a minute longer, for compiling.
+    Where it is near 0 a run takes a minute or two longer, for compiling.
     """
     folders = {getattr(getattr(k, "_cache", None), "cache_path", None) for k in _KERNELS}
     kept = {file.name.rsplit("-", 1)[0] for folder in folders if folder for file in Path(folder).glob("*.nbi")}
