@@ -250,7 +250,7 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     boundary = timed("smooth", smooth_boundaries, staircase, smoothing)
     if options.periodic != "none":
         boundary = match_opposite_sides(boundary, options.periodic)
-    boundary, mesh = timed("mesh", _mesh, boundary, meshing, labels.materials, options.periodic)
+    boundary, mesh = timed("mesh", fill_boundaries, boundary, meshing, labels.materials, options.periodic)
     return Run(
         options=options,
         segmentation=found,
@@ -277,7 +277,7 @@ def segment_source(source: Source, options: SegmentationOptions | None = None) -
     return segment_picture(read_source(source), options)
 
 
-def _mesh(
+def fill_boundaries(
     boundary: BoundaryGraph, options: MeshingOptions, materials: Materials, periodic: str
 ) -> tuple[BoundaryGraph, QuadMesh]:
     """Mesh; where the mesher has cut edges of one side of a periodic cell only, cut the other, too, and mesh anew."""

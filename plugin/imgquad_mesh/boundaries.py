@@ -19,6 +19,7 @@ FIELD_ARRAYS = (
     "region_label", "region_pixels", "picture_shape", "pixel_origin", "pixel_axes",
 )  # fmt: skip
 SIZES = "mesh_sizes"  #: field array of a smoothed boundary: size and growth
+PERIODIC = "periodic"  #: "x", "y" or "xy" where opposite sides match
 MATERIAL_SIZES = "mesh_material_sizes"  #: rows of number and size
 
 
@@ -28,7 +29,8 @@ class Boundaries(NamedTuple):
     graph: BoundaryGraph
     materials: Materials
     placement: Placement
-    sizes: tuple[float, float, Mapping[int, float]] | None  # size, growth, material sizes of smoothing
+    sizes: tuple[float, float, Mapping[int, float]] | None = None  # size, growth, material sizes of smoothing
+    periodic: str = "none"  # directions in which sides match
 
 
 def to_lines(boundaries: Boundaries) -> pv.PolyData:
@@ -37,7 +39,7 @@ def to_lines(boundaries: Boundaries) -> pv.PolyData:
     Cell arrays `boundary_labels` (left, right; active), `boundary_regions` and `chain`; point arrays `point_kind` and
     `pixel_coordinates`; field arrays of the materials, regions, sizes and of where the pixels lie.
     """
-    graph, materials, placement, sizes = boundaries
+    graph, materials, placement, sizes, periodic = boundaries
     left_right = np.append(graph.region_label, np.int32(VOID))[graph.chain_regions]  # region -1 takes the last one
     lines = chain_lines(graph.points, graph.chain_offsets, graph.chain_points, left_right, graph.point_kind, placement)
     lines.cell_data["boundary_regions"] = graph.chain_regions
@@ -50,6 +52,8 @@ def to_lines(boundaries: Boundaries) -> pv.PolyData:
         "pixel_origin": placement.origin,
         "pixel_axes": placement.axes,
     }
+    if periodic != "none":
+        fields[PERIODIC] = periodic
     if sizes:
         fields[SIZES] = np.array(sizes[:2], float)
         if sizes[2]:
@@ -85,7 +89,8 @@ def from_lines(lines: pv.PolyData) -> Boundaries:
     )
     placement = Placement(np.array(fields["pixel_origin"]), np.array(fields["pixel_axes"]).reshape(2, 3))
     _assert_unmoved(lines, graph, placement)
-    return Boundaries(graph, materials_of(lines), placement, _sizes(lines))
+    periodic = str(fields[PERIODIC][0]) if PERIODIC in fields else "none"
+    return Boundaries(graph, materials_of(lines), placement, _sizes(lines), periodic)
 
 
 def _sizes(lines: pv.PolyData) -> tuple[float, float, Mapping[int, float]] | None:

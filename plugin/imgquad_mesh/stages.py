@@ -8,10 +8,10 @@ import numpy as np
 
 from imgquad_core.boundary import ExtractionOptions, extract_boundaries
 from imgquad_core.errors import InputError
-from imgquad_core.meshing import MeshingOptions, mesh_boundaries
+from imgquad_core.meshing import MeshingOptions
 from imgquad_core.model import LabelImage, QuadMesh
 from imgquad_core.periodic import match_opposite_sides
-from imgquad_core.pipeline import MOST_QUADS
+from imgquad_core.pipeline import MOST_QUADS, fill_boundaries
 from imgquad_core.selection import assert_solid
 from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_mesh.boundaries import Boundaries
@@ -21,7 +21,7 @@ from imgquad_mesh.convert import Placement
 def extracted(labels: LabelImage, placement: Placement, options: ExtractionOptions) -> Boundaries:
     """Return the boundaries of pixels."""
     assert_solid(labels)
-    return Boundaries(extract_boundaries(labels, options), labels.materials, placement, None)
+    return Boundaries(extract_boundaries(labels, options), labels.materials, placement)
 
 
 def smoothed(given: Boundaries, options: SmoothingOptions, periodic: str) -> Boundaries:
@@ -32,12 +32,12 @@ def smoothed(given: Boundaries, options: SmoothingOptions, periodic: str) -> Bou
     if periodic != "none":
         graph = match_opposite_sides(graph, periodic)
     sizes = (options.size, options.growth, dict(options.material_sizes or {}))
-    return given._replace(graph=graph, placement=placement, sizes=sizes)
+    return given._replace(graph=graph, placement=placement, sizes=sizes, periodic=periodic)
 
 
 def filled(given: Boundaries, options: MeshingOptions) -> QuadMesh:
     """Return the quads between smoothed boundaries."""
-    return mesh_boundaries(given.graph, options, given.materials)
+    return fill_boundaries(given.graph, options, given.materials, given.periodic)[1]
 
 
 def _true_shape(shape: tuple[int, int], placement: Placement) -> tuple[tuple[int, int], Placement]:
