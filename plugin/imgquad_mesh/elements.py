@@ -56,7 +56,7 @@ def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
     """Return the elements of `mesh` that `options` asks for, with all sets."""
     from imgquad_core.cohesive import split_interfaces
     from imgquad_core.extrusion import extrude
-    from imgquad_core.periodic import with_periodic_pairs
+    from imgquad_core.pairing import with_periodic_pairs
     from imgquad_core.second_order import second_order
     from imgquad_core.sets import fe_mesh
 

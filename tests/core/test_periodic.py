@@ -14,7 +14,7 @@ from imgquad_core.cohesive import split_interfaces
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.extrusion import extrude
 from imgquad_core.model import VOID
-from imgquad_core.periodic import with_periodic_pairs
+from imgquad_core.pairing import with_periodic_pairs
 from imgquad_core.pipeline import MeshOptions, mesh_image, run
 from imgquad_core.quality import scaled_jacobian
 from imgquad_core.second_order import second_order
