@@ -35,7 +35,7 @@ Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
 
 STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
-LEAST_WIDTH = 1.5  # of a face on level 2, in its coarse segments
+LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
 POOR = 0.5  # scaled Jacobian below which single quads are replaced
@@ -135,7 +135,8 @@ def mesh_boundaries(
     Returns
     -------
     QuadMesh
-        Convex, counter-clockwise quads; every point of `graph` is a point of the mesh with the same id.
+        Convex, counter-clockwise quads. The points of `graph` come first, in their order; those inside chains may
+        have slid along them, and chains of two edges may have got more.
 
     Raises
     ------

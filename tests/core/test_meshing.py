@@ -123,7 +123,7 @@ def test_square_is_a_regular_grid_of_the_size_asked_for(size: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "edge", "within", "count"), [(1.5, 0.1, 0.97, 0.15), (3.0, 0.1, 0.97, 0.15), (5.0, 0.2, 0.9, 0.45)]
+    ("size", "edge", "within", "count"), [(1.5, 0.1, 0.97, 0.15), (3.0, 0.1, 0.97, 0.15), (5.0, 0.12, 0.97, 0.25)]
 )
 def test_final_edges_are_about_as_long_as_asked_for(size: float, edge: float, within: float, count: float) -> None:
     # at size 5 the disc is 16 edges wide, four of the level it is meshed on
