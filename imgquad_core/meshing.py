@@ -343,10 +343,10 @@ def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) 
 
 def _slid(mesh: QuadMesh, rounds: int) -> QuadMesh:
     """Let boundary nodes slide, and the nodes inside follow."""
-    points, at = mesh.points.copy(), np.zeros(mesh.n_points)
+    points, gone = mesh.points.copy(), np.zeros(mesh.n_points)
     rings, free = rings_of(mesh.quads, mesh.n_points), mesh.point_kind == PointKind.INTERIOR
     for _ in range(rounds):
-        slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, mesh.points, at)
+        slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
         newton(points, rings, free, 2, GOOD)
     return replace(mesh, points=points)
 

@@ -1,7 +1,10 @@
 """Let boundary nodes slide along their own chain, for the sake of the quads on both sides.
 
-A node stays on the parabola through its own place and its two neighbours' places t = -1, 0, 1 on the chain, within
-`REACH` of its own, so the boundary keeps its shape; junctions, corners and the ends of chains stay.
+A node v moves parallel to the line through its neighbours p and n on the chain, so the areas on both sides stay what
+they are, to the last digits; it goes at most `REACH` of the way. Junctions, corners and the ends of chains stay.
+
+      <--v-->
+    p/       \\n
 """
 
 from __future__ import annotations
@@ -22,46 +25,39 @@ _FREE, _FRAME = int(PointKind.FREE), int(PointKind.FRAME)
 
 
 @kernel
-def slide(
-    points: Points, rings: Rings, kind: NDArray[np.uint8], offsets: Ids, ids: Ids, chain: Points, at: Points
-) -> None:
+def slide(points: Points, rings: Rings, kind: NDArray[np.uint8], offsets: Ids, ids: Ids, gone: Points) -> None:
     """Move each boundary node once to where the energy of its ring is least, in place.
 
-    `chain` holds the places of the nodes before any slide, `at` how far each has gone (t), which is kept up to date.
+    `gone` holds how far each node has gone, in halves of the distance of its neighbours, and is kept up to date.
     """
     energy = np.empty(6)
     for c in range(offsets.size - 1):
         for i in range(offsets[c] + 1, offsets[c + 1] - 1):
             v = ids[i]
             if kind[v] == _FREE or kind[v] == _FRAME:
-                _slide_node(points, rings, v, chain[ids[i - 1]], chain[v], chain[ids[i + 1]], at, energy)
+                _slide_node(points, rings, v, ids[i - 1], ids[i + 1], gone, energy)
 
 
 @kernel
-def _slide_node(
-    points: Points, rings: Rings, v: int, before: Points, here: Points, behind: Points, at: Points, energy: Points
-) -> None:
-    """Move node v along the parabola through `before`, `here` and `behind` by one guarded Newton step."""
+def _slide_node(points: Points, rings: Rings, v: int, p: int, n: int, gone: Points, energy: Points) -> None:
+    """Move node v parallel to the line from p to n by one guarded Newton step."""
     quality = ring_quality(points, rings, v)
     if quality > GOOD_ENOUGH:
         return
-    old, x, y = at[v], points[v, 0], points[v, 1]
-    ax, ay = 0.5 * (behind[0] - before[0]), 0.5 * (behind[1] - before[1])
-    bx, by = 0.5 * (behind[0] + before[0]) - here[0], 0.5 * (behind[1] + before[1]) - here[1]
+    x, y = points[v, 0], points[v, 1]
+    tx, ty = 0.5 * (points[n, 0] - points[p, 0]), 0.5 * (points[n, 1] - points[p, 1])
     ring_energy(points, rings, v, energy)
-    tx, ty, least = ax + 2.0 * old * bx, ay + 2.0 * old * by, energy[0]
+    least = energy[0]
     slope = energy[1] * tx + energy[2] * ty
     bend = energy[3] * tx * tx + 2.0 * energy[4] * tx * ty + energy[5] * ty * ty
     if not np.isfinite(least) or bend <= 0.0:
         return
-    step = min(max(old - slope / bend, -REACH), REACH) - old
+    step = min(max(gone[v] - slope / bend, -REACH), REACH) - gone[v]
     for _ in range(HALVINGS):
-        t = old + step
-        points[v, 0] = here[0] + t * ax + t * t * bx
-        points[v, 1] = here[1] + t * ay + t * t * by
+        points[v, 0], points[v, 1] = x + step * tx, y + step * ty
         ring_energy(points, rings, v, energy)
         if energy[0] < least and ring_quality(points, rings, v) >= min(quality, GUARD):
-            at[v] = t
+            gone[v] += step
             return
         step *= 0.5
     points[v, 0], points[v, 1] = x, y
