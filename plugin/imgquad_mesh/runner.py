@@ -6,6 +6,7 @@ import json
 import os
 import queue
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -90,6 +91,7 @@ class MeshLabProcess:
             When it fails, when the process ends, or when `deadline` passes.
         """
         line = json.dumps({"do": do, **request}) + "\n"
+        _ignore_broken_pipes()
         try:
             assert self._process.stdin is not None
             self._process.stdin.write(line)
@@ -217,3 +219,9 @@ def _pass_lines(pipe: IO[str] | None, answers: queue.Queue[str]) -> None:
     for line in pipe or ():
         answers.put(line)
     answers.put("")  # the process has ended
+
+
+def _ignore_broken_pipes() -> None:
+    """Have a write to a dead process raise, as Python does: gmsh.initialize lets its signal end this process."""
+    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
