@@ -49,10 +49,6 @@ def _frozen_sets(sets: Mapping[str, ArrayLike]) -> Mapping[str, Ints]:
     return MappingProxyType({name: _frozen(ids, np.int64) for name, ids in sets.items()})
 
 
-def _no_pairs() -> Ints:
-    return np.empty((0, 2), np.int64)
-
-
 @dataclass(frozen=True, eq=False)
 class FEMesh:
     """Nodes, elements and named sets, ready for a solver.

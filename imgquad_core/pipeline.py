@@ -272,11 +272,6 @@ def read_source(source: Source, options: ReadOptions | None = None) -> Picture |
     return source if isinstance(source, LabelImage) else np.asarray(source)
 
 
-def segment_source(source: Source, options: SegmentationOptions | None = None) -> Segmentation:
-    """Read and segment a picture, and tell what was chosen."""
-    return segment_picture(read_source(source), options)
-
-
 def fill_boundaries(
     boundary: BoundaryGraph, options: MeshingOptions, materials: Materials, periodic: str
 ) -> tuple[BoundaryGraph, QuadMesh]:
