@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind
 
 OUTSIDE = -2  #: colour of what lies around the picture
@@ -166,7 +166,7 @@ def _classify_corners(padded: NDArray[np.int32], policy: int) -> NDArray[np.uint
     return code
 
 
-@kernel
+@verb
 def _resolve(padded: NDArray[np.int32], i: int, j: int, policy: int) -> int:
     """Choose what the chains do where all four sides have two colours."""
     a, b = padded[i, j], padded[i, j + 1]
@@ -186,7 +186,7 @@ def _resolve(padded: NDArray[np.int32], i: int, j: int, policy: int) -> int:
     return _JOINS_AD if (n_a < n_b) == (policy == _MINORITY) else _JOINS_BC
 
 
-@kernel
+@verb
 def _root(parent: NDArray[np.int64], k: int) -> int:
     while parent[k] != k:
         parent[k] = parent[parent[k]]
@@ -194,7 +194,7 @@ def _root(parent: NDArray[np.int64], k: int) -> int:
     return k
 
 
-@kernel
+@verb
 def _unite(parent: NDArray[np.int64], a: int, b: int) -> None:
     a, b = _root(parent, a), _root(parent, b)
     parent[max(a, b)] = min(a, b)
@@ -240,7 +240,7 @@ def _label_runs(
     return region, first_run[:n_regions].copy()
 
 
-@kernel
+@verb
 def _region_at(
     starts: NDArray[np.int64], rows: NDArray[np.int64], region: NDArray[np.int64], n_cols: int, i: int, j: int
 ) -> int:
@@ -256,7 +256,7 @@ def _region_at(
     return int(region[low])
 
 
-@kernel
+@verb
 def _leave(code: int, came_from: int) -> int:
     """Give the side (0 up, 1 right, 2 down, 3 left) by which a chain leaves a corner, from the one it came by."""
     what = code & _WHAT
@@ -268,7 +268,7 @@ def _leave(code: int, came_from: int) -> int:
     return 0 if rest == 1 else 1 if rest == 2 else 2 if rest == 4 else 3
 
 
-@kernel
+@verb
 def _see(code: NDArray[np.uint8], i: int, j: int, side: int) -> bool:
     """Mark a side as traced, and tell whether it was before."""
     if side == 0:
@@ -281,7 +281,7 @@ def _see(code: NDArray[np.uint8], i: int, j: int, side: int) -> bool:
     return seen
 
 
-@kernel
+@verb
 def _follow(code: NDArray[np.uint8], i: int, j: int, side: int, places: NDArray[np.int32], n: int) -> tuple[int, int]:
     """Append the points from corner (i, j) along `side` up to a junction; gives their number and its corner."""
     while True:
@@ -301,7 +301,7 @@ def _follow(code: NDArray[np.uint8], i: int, j: int, side: int, places: NDArray[
         side = onward
 
 
-@kernel
+@verb
 def _is_seen(code: NDArray[np.uint8], i: int, j: int, side: int) -> bool:
     bit = _SEEN_DOWN if side % 2 == 0 else _SEEN_RIGHT
     return bool(code[i - (side == 0), j - (side == 3)] & bit != 0)

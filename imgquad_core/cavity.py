@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .halfedge import corners_at, twins_of
-from .jit import kernel
+from .jit import kernel, verb
 from .patterns import Canvas
 from .splitting import INNER_VALENCE, FaceQuads
 
@@ -133,7 +133,7 @@ def _fill_rings(ring: Ids, offsets: Ids, corners: Ids) -> None:
             ring[v, i - offsets[v]] = corners[i] >> 2
 
 
-@kernel
+@verb
 def penalty(valence: int, wanted: int, rim: bool) -> int:
     """Irregularity of a node: 1, 3, 5, ... inside; on the rim a missing quad (a wide corner) is worst."""
     d = valence - wanted
@@ -152,7 +152,7 @@ def begin(cavity: Cavity) -> None:
         cavity.count[i] = 0
 
 
-@kernel
+@verb
 def add_quad(net: Net, cavity: Cavity, q: int) -> None:
     """Put quad q into the cavity and bring the outline up to date."""
     count = cavity.count
@@ -184,7 +184,7 @@ def add_quad(net: Net, cavity: Cavity, q: int) -> None:
             count[RIM_EDGES] += 1
 
 
-@kernel
+@verb
 def add_ring(net: Net, cavity: Cavity, v: int) -> bool:
     """Put all quads at node v into the cavity; return whether that was any."""
     before = cavity.count[MEMBERS]
@@ -193,7 +193,7 @@ def add_ring(net: Net, cavity: Cavity, v: int) -> bool:
     return bool(cavity.count[MEMBERS] > before)
 
 
-@kernel
+@verb
 def settle(net: Net, cavity: Cavity, largest: int, most_needed: int) -> bool:
     """Add quads until no node of the outline is a pinch or needs more than `most_needed` of them (is concave).
 
@@ -213,7 +213,7 @@ def settle(net: Net, cavity: Cavity, largest: int, most_needed: int) -> bool:
     return count[MEMBERS] <= largest and _trace_outline(net, cavity)
 
 
-@kernel
+@verb
 def _leaving_edge(net: Net, cavity: Cavity, v: int) -> int:
     """Return the half-edge of the outline that leaves node v."""
     h = cavity.leave[v]
@@ -230,7 +230,7 @@ def _leaving_edge(net: Net, cavity: Cavity, v: int) -> int:
     return -1
 
 
-@kernel
+@verb
 def _trace_outline(net: Net, cavity: Cavity) -> bool:
     """Trace the outline and find its corners; return whether it is one loop."""
     count = cavity.count
@@ -265,7 +265,7 @@ def _trace_outline(net: Net, cavity: Cavity) -> bool:
     return bool(n == total)
 
 
-@kernel
+@verb
 def push_side(net: Net, cavity: Cavity) -> bool:
     """Grow the cavity by the row behind one side: the one with most irregular nodes, then the longest."""
     n, n_loop, stamp = cavity.count[CORNERS], cavity.count[OUTLINE], cavity.count[STAMP]
@@ -291,7 +291,7 @@ def push_side(net: Net, cavity: Cavity) -> bool:
     return True
 
 
-@kernel
+@verb
 def push_all(net: Net, cavity: Cavity) -> bool:
     """Grow the cavity on all sides."""
     before, n_loop = cavity.count[MEMBERS], cavity.count[OUTLINE]
@@ -302,7 +302,7 @@ def push_all(net: Net, cavity: Cavity) -> bool:
     return bool(cavity.count[MEMBERS] > before)
 
 
-@kernel
+@verb
 def remove(net: Net, cavity: Cavity) -> None:
     """Take the cavity's quads out of the mesh."""
     stamp = cavity.count[STAMP]
@@ -333,7 +333,8 @@ def insert(net: Net, canvas: Canvas, new_id: Ids, face: int) -> None:
         net.tops[1] -= 1
         v = net.free_nodes[net.tops[1]]
         new_id[p] = v
-        net.points[v] = canvas.points[canvas.first + p]
+        for i in range(2):
+            net.points[v, i] = canvas.points[canvas.first + p, i]
         net.wanted[v], net.rim[v], net.valence[v] = INNER_VALENCE, False, 0
     for i in range(canvas.count[1]):
         net.tops[0] -= 1
@@ -351,7 +352,7 @@ def insert(net: Net, canvas: Canvas, new_id: Ids, face: int) -> None:
         _join(net, canvas.quads[i, 0])
 
 
-@kernel
+@verb
 def _join(net: Net, q: int) -> None:
     """Set the twins of the four half-edges of quad q."""
     for k in range(4):

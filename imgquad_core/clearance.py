@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.curves import Flags, Floats, Ints
 from imgquad_core.features import add_up
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 
 UNITS = 16384.0  #: grid steps a pixel
 FREE, SHARP, CLOSE, CROSSING = range(4)  #: what a segment is marked with
@@ -47,6 +47,7 @@ def find_conflicts(
         FREE, CLOSE or CROSSING.
     """
     marks = np.zeros(len(segments), np.uint8)
+    points = np.require(points, requirements="W")  # kernels are compiled once more for a read-only array
     if len(segments):
         lengths = np.hypot(*(points[segments[:, 1]] - points[segments[:, 0]]).T)
         cell = max(float(lengths.mean()), float(np.sqrt(shape[0] * shape[1] / (4.0 * len(segments)))))
@@ -118,13 +119,13 @@ def _compare_in_cells(
                     _raise(marks, other, mark)
 
 
-@kernel
+@verb
 def _raise(marks: NDArray[np.uint8], k: int, mark: int) -> None:
     if marks[k] < mark:
         marks[k] = mark
 
 
-@kernel
+@verb
 def _any_new(chain: Ints, is_new: Flags, items: Ints, low: int, high: int) -> bool:
     for i in range(low, high):
         if is_new[chain[items[i]]]:
@@ -132,7 +133,7 @@ def _any_new(chain: Ints, is_new: Flags, items: Ints, low: int, high: int) -> bo
     return False
 
 
-@kernel
+@verb
 def _compare(grid: Ints, points: Floats, a: int, b: int, c: int, d: int) -> int:
     """FREE, CLOSE or CROSSING for the segments a b and c d."""
     if a in (c, d) or b in (c, d):
@@ -155,14 +156,14 @@ def _compare(grid: Ints, points: Floats, a: int, b: int, c: int, d: int) -> int:
     return FREE
 
 
-@kernel
+@verb
 def _orient(grid: Ints, a: int, b: int, c: int) -> int:
     """Sign of the turn a, b, c."""
     turn = (grid[b, 0] - grid[a, 0]) * (grid[c, 1] - grid[a, 1]) - (grid[b, 1] - grid[a, 1]) * (grid[c, 0] - grid[a, 0])
     return int(turn > 0) - int(turn < 0)
 
 
-@kernel
+@verb
 def _boxes_meet(grid: Ints, a: int, b: int, c: int, d: int) -> bool:
     for k in range(2):
         if max(grid[a, k], grid[b, k]) < min(grid[c, k], grid[d, k]) or max(grid[c, k], grid[d, k]) < min(
@@ -172,7 +173,7 @@ def _boxes_meet(grid: Ints, a: int, b: int, c: int, d: int) -> bool:
     return True
 
 
-@kernel
+@verb
 def _is_close(points: Floats, a: int, b: int, c: int, d: int) -> bool:
     """Tell whether c or d is nearer to the segment a b than a quarter of its length."""
     dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
@@ -218,7 +219,7 @@ def mark_sharp(
                     _raise(marks, other, SHARP)
 
 
-@kernel
+@verb
 def _first_segment(socket: int, chain_points: Ints, offsets: Ints) -> tuple[int, int]:
     """Segment of a chain at one of its ends, and the point at the far side of it."""
     c = socket // 2
@@ -227,7 +228,7 @@ def _first_segment(socket: int, chain_points: Ints, offsets: Ints) -> tuple[int,
     return offsets[c] - c, chain_points[offsets[c] + 1]
 
 
-@kernel
+@verb
 def _sector(points: Floats, v: int, p: int, q: int) -> float:
     """Angle between the segments from v to p and to q."""
     ux, uy = points[p, 0] - points[v, 0], points[p, 1] - points[v, 1]

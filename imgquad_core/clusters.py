@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 
 #: the window of the local minority is 2 * REACH pixels wide, as in the boundary stage
 REACH = 3
@@ -55,7 +55,7 @@ def join(clusters: Clusters, p: int, q: int) -> int:
     return high
 
 
-@kernel
+@verb
 def joined_diagonal(colors: NDArray[np.int32], r: int, c: int) -> int:
     """Return which pixels are connected over the corner of four pixels that no side connects.
 
@@ -72,7 +72,7 @@ def joined_diagonal(colors: NDArray[np.int32], r: int, c: int) -> int:
     return 1 if a == d else (2 if b == x else 0)
 
 
-@kernel
+@verb
 def is_minority(colors: NDArray[np.int32], r: int, c: int, a: int, b: int) -> bool:
     """Return whether `a` is rarer than `b` around the corner (r, c), or as rare and the lower number."""
     more = 0

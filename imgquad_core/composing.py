@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cutting import CutMesh
-from .jit import kernel
+from .jit import kernel, verb
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -47,7 +47,7 @@ def compose(mesh: CutMesh) -> Ids:
     return mate
 
 
-@kernel
+@verb
 def _corner(points: Points, v: int, a: int, b: int) -> tuple[float, float]:
     """Return sine and cosine of the angle at v from edge v->a to edge v->b."""
     ax, ay = points[a, 0] - points[v, 0], points[a, 1] - points[v, 1]

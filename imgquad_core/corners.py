@@ -10,7 +10,7 @@ import numpy as np
 
 from imgquad_core.curves import Curves, Flags, Floats, line_beside, started_at
 from imgquad_core.fitting import quadratic_at
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 
 _SIDE = 6.0  # px of arc of each side
 _SIDES = np.array([26.0, 18.0, 12.0, 8.5, _SIDE])  # what is tried to place a corner, as long as both are straight
@@ -83,7 +83,7 @@ def _find(curves: Curves) -> Flags:
     return is_corner
 
 
-@kernel
+@verb
 def _corner_at(curves: Curves, c: int, i: int, far: float) -> tuple[float, float, float]:
     """How straight the sides of point i are (0: no corner), and the shift to where their lines meet."""
     step = curves.ends.shape[1] - 1  # 1, but not a literal: those are compiled for on their own
@@ -99,7 +99,7 @@ def _corner_at(curves: Curves, c: int, i: int, far: float) -> tuple[float, float
     return 1.0 - max(rms_u, rms_v), x, y
 
 
-@kernel
+@verb
 def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> int:
     """Copy the points around i; gives the place of i among them."""
     first, last = curves.offsets[c], curves.offsets[c + 1] - 1
@@ -120,7 +120,7 @@ def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> 
     return i - low
 
 
-@kernel
+@verb
 def _nearest(curves: Curves, c: int, i: int, x: float, y: float) -> int:
     """Point of the chain nearest to (x, y), within 6 points of i."""
     first, last = curves.offsets[c], curves.offsets[c + 1] - 1
@@ -135,7 +135,7 @@ def _nearest(curves: Curves, c: int, i: int, x: float, y: float) -> int:
     return best
 
 
-@kernel
+@verb
 def _is_best(curves: Curves, c: int, i: int, score: Floats) -> bool:
     """Is there no better corner near point i? The first one wins a tie."""
     first, last = curves.offsets[c], curves.offsets[c + 1] - 1

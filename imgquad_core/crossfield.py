@@ -99,7 +99,8 @@ def _rim_values(points: Points, triangles: Ids, twins: Ids, max_size: Points) ->
             size[v] = total[v] / count[v]
             norm = np.hypot(cross[v, 0], cross[v, 1])
             if norm > 1e-9:
-                cross[v] /= norm
+                cross[v, 0] /= norm
+                cross[v, 1] /= norm
     return cross, size
 
 
@@ -120,7 +121,8 @@ def _relax_cross(cross: Points, fixed: NDArray[np.bool_], offsets: Ids, neighbor
     for v in range(len(cross)):
         norm = np.hypot(cross[v, 0], cross[v, 1])
         if norm > 1e-12:
-            cross[v] /= norm
+            cross[v, 0] /= norm
+            cross[v, 1] /= norm
         else:
             cross[v, 0], cross[v, 1] = 1.0, 0.0
 

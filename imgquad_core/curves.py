@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 from imgquad_core.model import BoundaryGraph, PointKind
 
 Floats = NDArray[np.float64]
@@ -143,7 +143,7 @@ def per_point(curves: Curves, values: NDArray[Any]) -> NDArray[Any]:
     return np.repeat(values, np.diff(curves.offsets))
 
 
-@kernel
+@verb
 def line_beside(
     curves: Curves, c: int, i: int, step: int, near: float, far: float
 ) -> tuple[int, float, float, float, float, float]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .jit import kernel
+from .jit import kernel, verb
 from .triangulation import Constraints, Triangles
 
 Ids = NDArray[np.int64]
@@ -136,7 +136,7 @@ def _compress(triangles: Ids, twins: Ids, middle: Ids, keep: NDArray[np.bool_]) 
     return kept, kept_twins, kept_middle
 
 
-@kernel
+@verb
 def _corner_angle(points: Points, triangles: Ids, c: int) -> float:
     """Angle of corner c = 3 t + k."""
     t, k = c // 3, c % 3

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.clusters import Clusters, find, join, joined_diagonal, labelled_clusters
 from imgquad_core.errors import InputError
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage
 
 
@@ -271,7 +271,7 @@ def merged_roots(clusters: Clusters, queue: Queue, size: int, roots: NDArray[np.
     return n
 
 
-@kernel
+@verb
 def neighbour_color(colors: NDArray[np.int32], clusters: Clusters, scratch: Scratch, root: int) -> int:
     """Return the colour with the longest border to a cluster, `VOID` where it has no neighbour."""
     border, largest = scratch.border, scratch.largest
@@ -301,7 +301,7 @@ def neighbour_color(colors: NDArray[np.int32], clusters: Clusters, scratch: Scra
     return best
 
 
-@kernel
+@verb
 def precedes(border: NDArray[np.int64], largest: NDArray[np.int64], a: int, b: int) -> bool:
     """Return whether colour `a` is the better taker: longer border, larger neighbour, lower number."""
     if border[a] != border[b]:
@@ -319,7 +319,7 @@ def sides(p: int, rows: int, cols: int) -> tuple[int, int, int, int]:
     return above, p - 1 if c > 0 else -1, p + 1 if c < cols - 1 else -1, below
 
 
-@kernel
+@verb
 def characteristic_length(colors: NDArray[np.int32], clusters: Clusters, scratch: Scratch, root: int) -> int:
     """Return the number of pixels on the longest shortest path in a cluster, by two sweeps."""
     if clusters.pixels[root] < 3:
@@ -331,7 +331,7 @@ def characteristic_length(colors: NDArray[np.int32], clusters: Clusters, scratch
     return length
 
 
-@kernel
+@verb
 def farthest(colors: NDArray[np.int32], clusters: Clusters, scratch: Scratch, start: int) -> tuple[int, int]:
     """Return the pixel of a cluster that is the most steps from `start`, and the number of pixels on the way."""
     distance, front = scratch.distance, scratch.front
@@ -355,7 +355,7 @@ def farthest(colors: NDArray[np.int32], clusters: Clusters, scratch: Scratch, st
     return front[n - 1], distance[front[n - 1]]
 
 
-@kernel
+@verb
 def forget_distances(clusters: Clusters, scratch: Scratch, root: int) -> None:
     """Set the distances of a cluster back to zero."""
     p = root
@@ -364,7 +364,7 @@ def forget_distances(clusters: Clusters, scratch: Scratch, root: int) -> None:
         p = clusters.follower[p]
 
 
-@kernel
+@verb
 def give_away(colors: NDArray[np.int32], clusters: Clusters, queue: Queue, root: int, color: int) -> None:
     """Recolour a cluster and unite it, and what it kept apart, with what it now touches."""
     rows, cols = colors.shape
@@ -388,7 +388,7 @@ def give_away(colors: NDArray[np.int32], clusters: Clusters, queue: Queue, root:
         p = following
 
 
-@kernel
+@verb
 def merge_diagonal(colors: NDArray[np.int32], clusters: Clusters, queue: Queue, i: int, j: int) -> None:
     """Unite the pixels that are connected over one corner."""
     p = i * colors.shape[1] + j

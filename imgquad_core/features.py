@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from imgquad_core.curves import Curves, Floats, Ints
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 
 _REACH = (
     4.0  # px searched at the finest level; each level has every 4th point of the one before, and four times the reach
@@ -85,14 +85,14 @@ def bucket(points: Floats, ids: Ints, cell: float, n_across: int, n_up: int) -> 
     return start, items
 
 
-@kernel
+@verb
 def add_up(counts: Ints) -> None:
     """Replace counts by their running sum."""
     for k in range(1, len(counts)):
         counts[k] += counts[k - 1]
 
 
-@kernel
+@verb
 def _arc_between(curves: Curves, c: int, i: int, d: int, j: int) -> float:
     """Length along the curves from point i of chain c to point j of chain d, over at most one node."""
     to_end_i = curves.arc[curves.offsets[c + 1] - 1] - curves.arc[i]

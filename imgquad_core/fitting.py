@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.curves import Floats, Ints
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 
 WINDOWS = (3.0, 4.5, 6.5, 9.5, 14.0, 20.0, 30.0, 45.0, 65.0)  #: half widths that are tried, px of arc
 STAIR_NOISE = 0.33  #: px; steps of a digital straight line have a deviation of 1 / sqrt(12) = 0.289, some more
@@ -22,7 +22,7 @@ _SLOPE = 0.5  # and change by this much a px of arc
 _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are: regression would let them collapse
 
 
-@kernel
+@verb
 def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats) -> float:
     """Weighted sums within +-w of point i, with u = s - s[i] and x, y relative to it.
 
@@ -60,7 +60,7 @@ def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: 
     return count
 
 
-@kernel
+@verb
 def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
     """Coefficients of the quadratic with moments m[0:5] and right-hand side b (Cramer)."""
     a00 = m[2] * m[4] - m[3] * m[3]
@@ -77,7 +77,7 @@ def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, fl
     )
 
 
-@kernel
+@verb
 def quadratic_at(
     x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats
 ) -> tuple[float, float, float]:
@@ -92,7 +92,7 @@ def quadratic_at(
     return x0, y0, np.sqrt(max(across, 0.0) / count)
 
 
-@kernel
+@verb
 def _choose_windows(
     x: Floats, y: Floats, s: Floats, q: Floats, first: int, last: int, widest: float, windows: Floats, w: Floats
 ) -> None:
@@ -121,7 +121,7 @@ def _choose_windows(
         w[i] = min(w[i], w[i + 1] + _SLOPE * (s[i + 1] - s[i]))
 
 
-@kernel
+@verb
 def _extend(
     points: Floats, arc: Floats, weight: Floats, first: int, last: int, closed: bool, reach: float, out: Floats
 ) -> int:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .crossfield import CrossField
 from .cutting import CutMesh
-from .jit import kernel
+from .jit import kernel, verb
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -128,7 +128,7 @@ def _walk(mesh_points: Points, triangles: Ids, twins: Ids, t: int, x: float, y: 
     return -1
 
 
-@kernel
+@verb
 def _sample(mesh: CutMesh, field: CrossField, t: int, x: float, y: float) -> tuple[float, float]:
     """Return (direction of one arm, size) at (x, y) in triangle t."""
     a, b, c = mesh.triangles[t, 0], mesh.triangles[t, 1], mesh.triangles[t, 2]
@@ -144,19 +144,19 @@ def _sample(mesh: CutMesh, field: CrossField, t: int, x: float, y: float) -> tup
     return np.arctan2(uy, ux) / 4.0, wa * field.size[a] + wb * field.size[b] + wc * field.size[c]
 
 
-@kernel
+@verb
 def _level(size: float) -> int:
     """Level of the hash grid whose cells are at least as wide as the exclusion radius."""
     return int(np.ceil(np.log2(EXCLUSION * size)))
 
 
-@kernel
+@verb
 def _bucket(level: int, i: int, j: int, mask: int) -> int:
     """Bucket of cell (i, j) of a level."""
     return ((i * 73856093) ^ (j * 19349663) ^ (level * 83492791)) & mask
 
 
-@kernel
+@verb
 def _insert(front: _Front, p: int) -> None:
     """Put point p into the hash grid."""
     level = _level(front.size[p])
@@ -167,7 +167,7 @@ def _insert(front: _Front, p: int) -> None:
     front.heads[b] = p
 
 
-@kernel
+@verb
 def _crowded(front: _Front, face_of: Ids, face: int, x: float, y: float, size: float) -> bool:
     """Whether a point of the same face is closer to (x, y) than the exclusion radius."""
     radius = EXCLUSION * size
@@ -185,7 +185,7 @@ def _crowded(front: _Front, face_of: Ids, face: int, x: float, y: float, size: f
     return False
 
 
-@kernel
+@verb
 def _spoke_end(
     mesh: CutMesh, field: CrossField, t: int, x: float, y: float, size: float, turn: float
 ) -> tuple[int, float, float, float]:
@@ -211,7 +211,7 @@ def _advance(mesh: CutMesh, field: CrossField, spokes: Spokes, front: _Front) ->
     """Fill `front`; return the number of points, or -1 if they do not fit."""
     n_rim = len(mesh.points)
     for v in range(n_rim):
-        front.points[v] = mesh.points[v]
+        front.points[v, 0], front.points[v, 1] = mesh.points[v, 0], mesh.points[v, 1]
         front.triangle[v] = spokes.triangle[v]
         front.size[v] = field.size[v]
         if spokes.triangle[v] >= 0:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from imgquad_core.curves import Curves, Ends, Floats, line_beside
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 from imgquad_core.model import PointKind
 
 _NEAR, _FAR = 1.2, 8.0  # px of arc of a chain that its line is fitted to
@@ -70,7 +70,7 @@ def _place(curves: Curves, nodes: Ends, room: Floats, width: float, height: floa
     return placed
 
 
-@kernel
+@verb
 def _scale(curves: Curves, nodes: Ends, v: int, dx: float, dy: float) -> float:
     """Choose the share of a shift that opens no sector to a notch in the region there."""
     widest = max(_widest_sector(curves, nodes, v, 0.0, 0.0), _NOTCH)
@@ -81,7 +81,7 @@ def _scale(curves: Curves, nodes: Ends, v: int, dx: float, dy: float) -> float:
     return 0.0
 
 
-@kernel
+@verb
 def _widest_sector(curves: Curves, nodes: Ends, v: int, dx: float, dy: float) -> float:
     """Widest angle between the chains of a shifted node, as they run a pixel away from it."""
     widest = 0.0
@@ -94,7 +94,7 @@ def _widest_sector(curves: Curves, nodes: Ends, v: int, dx: float, dy: float) ->
     return widest
 
 
-@kernel
+@verb
 def _bearing(curves: Curves, socket: int, dx: float, dy: float) -> float:
     """Direction from the shifted end of a chain to its point a pixel away."""
     first, last = curves.offsets[socket // 2], curves.offsets[socket // 2 + 1] - 1
@@ -105,7 +105,7 @@ def _bearing(curves: Curves, socket: int, dx: float, dy: float) -> float:
     return float(np.arctan2(curves.raw[i, 1] - curves.raw[end, 1] - dy, curves.raw[i, 0] - curves.raw[end, 0] - dx))
 
 
-@kernel
+@verb
 def _limit(curves: Curves, nodes: Ends, room: Floats, v: int) -> float:
     limit = _FARTHEST
     for k in range(nodes.offsets[v], nodes.offsets[v + 1]):
@@ -121,13 +121,13 @@ def _limit(curves: Curves, nodes: Ends, room: Floats, v: int) -> float:
     return limit
 
 
-@kernel
+@verb
 def _end(curves: Curves, socket: int) -> int:
     """Dense point of a chain at one of its ends."""
     return int(curves.offsets[socket // 2 + 1] - 1 if socket % 2 else curves.offsets[socket // 2])
 
 
-@kernel
+@verb
 def _meet(curves: Curves, nodes: Ends, v: int) -> tuple[float, float]:
     """Shift of a node to the point nearest to the lines of its chains."""
     a, b, d, p, q = _PULL, 0.0, _PULL, 0.0, 0.0
@@ -143,7 +143,7 @@ def _meet(curves: Curves, nodes: Ends, v: int) -> tuple[float, float]:
     return (d * p - b * q) / det, (a * q - b * p) / det
 
 
-@kernel
+@verb
 def _slide(curves: Curves, nodes: Ends, v: int, axis: int, windows: Floats) -> tuple[float, float]:
     """Shift of a node along the border, to where the lines of its inner chains meet it."""
     total, count = 0.0, 0

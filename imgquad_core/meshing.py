@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from . import aside
 from .batches import faces_only, in_batches, joined, no_quads
 from .composing import compose
 from .crossfield import cross_field
@@ -143,6 +144,7 @@ def mesh_boundaries(
     TopologyError
         If the chains cross.
     """
+    aside.start()
     options = options or MeshingOptions()
     graph = with_short_chains_halved(_consistent(graph), LEAST_WIDTH)
     for _ in range(REFITS):
@@ -217,6 +219,7 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
     if not faces.any():
         return _Level(no_quads(), faces, np.full(len(faces), -1.0), np.empty(0, np.int64))
     composed = _compose(graph, faces, stride, options)
+    aside.wait()
     edges = coarse_segments(graph, chains_of(graph, faces), 2)
     nothing = np.zeros(len(edges.tail), np.int64)
     middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)

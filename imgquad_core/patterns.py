@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .jit import kernel
+from .jit import inlined, kernel, verb
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -72,7 +72,7 @@ def piece_fits(length: Ids, n: int) -> bool:
     return True
 
 
-@kernel
+@verb
 def _cut_sides(length: Ids, n: int, i: int, j: int, a: int, b: int, l: int, one: Ids, two: Ids) -> None:
     """Sides of both pieces of a cut of l edges, from side i behind its first a edges to side j >= i behind its b."""
     one[0] = length[i] - a
@@ -85,7 +85,7 @@ def _cut_sides(length: Ids, n: int, i: int, j: int, a: int, b: int, l: int, one:
     two[i + n - j], two[i + n - j + 1] = a, l
 
 
-@kernel
+@inlined
 def choose_cut(points: Points, loop: Ids, corner: Ids, length: Ids, n: int, edge: float, best: Ids) -> bool:
     """Find the cut whose number of edges suits its length best; `best` gets (i, j, a, b, l).
 
@@ -120,7 +120,7 @@ def choose_cut(points: Points, loop: Ids, corner: Ids, length: Ids, n: int, edge
     return score < np.inf
 
 
-@kernel
+@inlined
 def piece_quads(length: Ids, n: int) -> int:
     """Number of quads in the pattern of a piece."""
     if n == 4:
@@ -131,7 +131,7 @@ def piece_quads(length: Ids, n: int) -> int:
     return total
 
 
-@kernel
+@inlined
 def cut_quads(length: Ids, n: int, cut: Ids) -> int:
     """Number of quads in both pieces of a cut, or in the one pattern where the cut has no edge."""
     one, two = np.empty(MAX_CORNERS + 2, np.int64), np.empty(MAX_CORNERS + 2, np.int64)
@@ -147,7 +147,7 @@ def cut_quads(length: Ids, n: int, cut: Ids) -> int:
     return total
 
 
-@kernel
+@verb
 def _draw_point(canvas: Canvas, x: float, y: float) -> int:
     p = canvas.first + canvas.count[0]
     canvas.points[p, 0], canvas.points[p, 1] = x, y
@@ -168,7 +168,7 @@ def draw_line(canvas: Canvas, u: int, w: int, edges: int, out: Ids, at: int) -> 
         )
 
 
-@kernel
+@verb
 def _draw_grid(canvas: Canvas, n: int, m: int) -> None:
     """Fill the lattice of (n + 1) x (m + 1) nodes, whose rim is given, by transfinite interpolation; draw its quads."""
     grid, points, w = canvas.lattice, canvas.points, n + 1
@@ -192,7 +192,7 @@ def _draw_grid(canvas: Canvas, n: int, m: int) -> None:
             canvas.count[1] += 1
 
 
-@kernel
+@inlined
 def draw_piece(canvas: Canvas, length: Ids, n: int) -> None:
     """Draw the pattern of a piece: ``canvas.poly`` holds its outline counter-clockwise from corner 0."""
     poly, grid = canvas.poly, canvas.lattice
@@ -236,7 +236,7 @@ def draw_piece(canvas: Canvas, length: Ids, n: int) -> None:
         _draw_grid(canvas, a, b)
 
 
-@kernel
+@inlined
 def draw_cut(canvas: Canvas, loop: Ids, corner: Ids, length: Ids, n: int, cut: Ids) -> None:
     """Draw both pieces of a cut (i, j, a, b, l), or the one pattern where the cut has no edge (l = 0)."""
     i, j, a, b, l = cut[0], cut[1], cut[2], cut[3], cut[4]
@@ -267,7 +267,8 @@ def smooth_drawn(canvas: Canvas, sweeps: int) -> None:
     """Move the drawn points to the mean of their neighbours, all at once, `sweeps` times."""
     n, sums = canvas.count[0], canvas.sums
     for _ in range(sweeps):
-        sums[:n] = 0.0
+        for p in range(n):
+            sums[p, 0], sums[p, 1], sums[p, 2] = 0.0, 0.0, 0.0
         for q in range(canvas.count[1]):
             for k in range(4):
                 p = canvas.quads[q, k] - canvas.first

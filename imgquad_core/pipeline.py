@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from . import aside
 from .boundary import ExtractionOptions, extract_boundaries
 from .denoise import DenoiseOptions, Removal, automatic_limits, list_removed, remove_noise
 from .errors import InputError
@@ -236,6 +237,7 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     progress : callable, optional
         Called as each stage starts.
     """
+    aside.start()
     options = options or MeshOptions()
     timed = _Stopwatch(progress)
     raw = timed("read", read_source, source, ReadOptions(options.max_pixels, options.frame))

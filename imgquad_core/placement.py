@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.curves import Curves, Flags, Floats, Ints
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 
 _LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
 _COARSE = 0.6  # mean size over asked size from which that is of use
@@ -91,7 +91,7 @@ def place_nodes(
     return Placement(offsets, at[: offsets[-1]], corner[: offsets[-1]])
 
 
-@kernel
+@verb
 def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, least: int) -> int:
     """Choose the number of coarse segments of a piece."""
     total = 0.5 * (cost[end] - cost[begin])
@@ -101,7 +101,7 @@ def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, le
     return max(int(np.ceil(total - 0.3)), least)
 
 
-@kernel
+@verb
 def _divide(cost: Floats, begin: int, end: int, number: int, at: Floats, n: int) -> None:
     """Put `number` equal steps of cost between two dense points behind node n."""
     j = begin
@@ -113,7 +113,7 @@ def _divide(cost: Floats, begin: int, end: int, number: int, at: Floats, n: int)
     at[n + number] = end
 
 
-@kernel
+@verb
 def _point(points: Floats, at: float) -> tuple[float, float]:
     i = min(int(at), len(points) - 2)
     t = at - i
@@ -154,7 +154,7 @@ def even_out(points: Floats, placed: Placement, exact: Flags, edge_ratio: float)
                 ax, ay, x, y = x, y, bx, by
 
 
-@kernel
+@verb
 def _bisector_crossing(points: Floats, low: float, high: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Where the curve from node a to node b crosses the perpendicular bisector of their chord."""
     nx, ny = bx - ax, by - ay

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .halfedge import corners_at
-from .jit import kernel
+from .jit import kernel, verb
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -39,11 +39,12 @@ class Rings(NamedTuple):
 
 def rings_of(quads: Ids, n_points: int) -> Rings:
     """Return the rings of the nodes of `quads`."""
+    quads = np.require(quads, requirements="W")  # kernels are compiled once more for a read-only array
     offsets, corners = corners_at(quads, n_points)
     return Rings(quads, offsets, corners)
 
 
-@kernel
+@verb
 def corner_sine(points: Points, quads: Ids, q: int, k: int) -> float:
     """Sine of the angle at corner k of quad q (negative where it is reflex)."""
     v, a, b = quads[q, k], quads[q, (k + 1) & 3], quads[q, (k + 3) & 3]
@@ -78,7 +79,7 @@ def ring_quality(points: Points, rings: Rings, v: int) -> float:
     return worst
 
 
-@kernel
+@verb
 def _activate_ring(active: Flags, rings: Rings, v: int) -> None:
     for i in range(rings.offsets[v], rings.offsets[v + 1]):
         for k in range(4):
@@ -155,10 +156,11 @@ def _corner_energy(
     )
 
 
-@kernel
+@verb
 def ring_energy(points: Points, rings: Rings, v: int, out: Points) -> None:
     """Sum energy and derivatives of the three corners of each ring quad that node v is part of, into `out` (6,)."""
-    out[:] = 0.0
+    for i in range(6):
+        out[i] = 0.0
     for i in range(rings.offsets[v], rings.offsets[v + 1]):
         c = rings.corners[i]
         q, k = c >> 2, c & 3
@@ -177,7 +179,7 @@ def ring_energy(points: Points, rings: Rings, v: int, out: Points) -> None:
             out[5] += hyy
 
 
-@kernel
+@verb
 def _newton_step(out: Points) -> tuple[float, float]:
     """Descent step from energy derivatives: Newton's, with the Hessian shifted to be positive definite."""
     gx, gy, hxx, hxy, hyy = out[1], out[2], out[3], out[4], out[5]
@@ -261,7 +263,7 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
     return left
 
 
-@kernel
+@verb
 def _move_towards(points: Points, rings: Rings, targets: Points, v: int) -> bool:
     """Move node v to its target, or half-way, where its ring stays valid; return whether it is there."""
     x, y = points[v, 0], points[v, 1]

@@ -31,7 +31,7 @@ from .cavity import (
     scratch,
     settle,
 )
-from .jit import kernel
+from .jit import kernel, verb
 from .patterns import Canvas
 from .relaxation import quad_quality
 from .splitting import FaceQuads
@@ -64,7 +64,7 @@ def repair(mesh: FaceQuads, below: float) -> FaceQuads:
     return compact(net, mesh) if changed else mesh
 
 
-@kernel
+@verb
 def _best_fill(points: Points, loop: Ids, n: int, best: Points, first: Ids, second: Ids) -> float:
     """Fill the tables of the best quads for each run of an outline; return the worst quality of the best filling."""
     corners = np.empty((1, 4), np.int64)
@@ -86,13 +86,13 @@ def _best_fill(points: Points, loop: Ids, n: int, best: Points, first: Ids, seco
     return float(best[0, n - 1])
 
 
-@kernel
+@verb
 def _draw_fill(canvas: Canvas, loop: Ids, n: int, first: Ids, second: Ids) -> None:
     """Draw the quads that the tables tell."""
     runs = np.empty((2 * n, 2), np.int64)
     runs[0, 0], runs[0, 1] = 0, n - 1
     top = 1
-    canvas.count[:] = 0
+    canvas.count[0], canvas.count[1] = 0, 0
     while top > 0:
         top -= 1
         i, j = runs[top, 0], runs[top, 1]
@@ -108,7 +108,7 @@ def _draw_fill(canvas: Canvas, loop: Ids, n: int, first: Ids, second: Ids) -> No
         top += 3
 
 
-@kernel
+@verb
 def _worst_drawn(canvas: Canvas) -> float:
     worst = 1.0
     for q in range(canvas.count[1]):
@@ -116,7 +116,7 @@ def _worst_drawn(canvas: Canvas) -> float:
     return worst
 
 
-@kernel
+@verb
 def _draw_star(canvas: Canvas, loop: Ids, n: int, turn: int) -> float:
     """Draw a star whose centre is joined to the nodes turn, turn + 2, ...; return its worst quality."""
     canvas.count[0], canvas.count[1] = 1, n // 2
@@ -136,7 +136,7 @@ def _draw_star(canvas: Canvas, loop: Ids, n: int, turn: int) -> float:
     return _centred(canvas, reach)
 
 
-@kernel
+@verb
 def _centred(canvas: Canvas, reach: float) -> float:
     """Move the drawn point to where the worst quality is best; return that."""
     o = canvas.first
@@ -156,7 +156,7 @@ def _centred(canvas: Canvas, reach: float) -> float:
     return best
 
 
-@kernel
+@verb
 def _grow(net: Net, cavity: Cavity, q: int, trial: int) -> bool:
     """Make the cavity of a trial at quad q.
 
@@ -178,7 +178,7 @@ def _grow(net: Net, cavity: Cavity, q: int, trial: int) -> bool:
     return settle(net, cavity, LARGEST, ANY) and cavity.count[OUTLINE] <= LONGEST
 
 
-@kernel
+@verb
 def _worst_member(net: Net, cavity: Cavity) -> float:
     worst = 1.0
     for i in range(cavity.count[MEMBERS]):
@@ -186,7 +186,7 @@ def _worst_member(net: Net, cavity: Cavity) -> float:
     return worst
 
 
-@kernel
+@verb
 def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) -> float:
     """Draw the cavity with corners k and k + 2 of quad q made one node; return its worst quality."""
     a, c = net.quads[q, k], net.quads[q, k + 2]
@@ -212,7 +212,7 @@ def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) ->
     return _centred(canvas, reach) if merged == o else _worst_drawn(canvas)
 
 
-@kernel
+@verb
 def _try(
     net: Net, cavity: Cavity, canvas: Canvas, q: int, trial: int, kind: int, best: Points, first: Ids, second: Ids
 ) -> float:
@@ -228,7 +228,7 @@ def _try(
     return worst
 
 
-@kernel
+@verb
 def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
     """Whether nodes of the outline can take all drawn quads."""
     for i in range(cavity.count[OUTLINE]):

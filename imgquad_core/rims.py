@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 
 #: how many pixels a rim may be followed to each side; wider ramps count as shades of their own
 REACH = 4
@@ -114,7 +114,7 @@ def direction(levels: NDArray[np.uint8], r: int, c: int) -> tuple[int, int, floa
     return dr, dc, most
 
 
-@kernel
+@verb
 def distance2(levels: NDArray[np.uint8], r: int, c: int, i: int, j: int) -> float:
     """Return the squared distance of two pixels' colours."""
     total = 0
@@ -134,7 +134,7 @@ def along(levels: NDArray[np.uint8], r: int, c: int, ar: int, ac: int, br: int, 
     return float(total)
 
 
-@kernel
+@verb
 def ramp_length(levels: NDArray[np.uint8], r: int, c: int, dr: int, dc: int) -> int:
     """Return how many pixels the colour goes on changing in the direction (dr, dc), as it does around (r, c)."""
     rows, cols, _ = levels.shape

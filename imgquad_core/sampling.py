@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .jit import kernel
+from .jit import kernel, verb
 
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
@@ -52,11 +52,12 @@ def _means(sums: Floats, points: Floats, quads: Ids) -> Floats:
             a, b = quads[q, k], quads[q, (k + 1) & 3]
             area += 0.5 * (points[a, 0] * points[b, 1] - points[b, 0] * points[a, 1])
             _add_edge(sums, points[a, 0], points[a, 1], points[b, 0], points[b, 1], means[q])
-        means[q] /= area
+        for c in range(n_channels):
+            means[q, c] /= area
     return means
 
 
-@kernel
+@verb
 def _add_edge(sums: Floats, ax: float, ay: float, bx: float, by: float, total: Floats) -> None:
     """Add the integral of F dy from a to b, cut at the sides of pixels."""
     n_rows, n_cols = sums.shape[0], sums.shape[1] - 1

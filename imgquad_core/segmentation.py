@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
 from imgquad_core.exact import dark_to_light, exact_labels
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage, Materials
 from imgquad_core.picture import Picture, picture_of
 from imgquad_core.quantisation import (
@@ -293,7 +293,7 @@ def commonest_around(labels: Labels) -> Labels:
     return found
 
 
-@kernel
+@verb
 def count_in(labels: Labels, top: int, left: int, bottom: int, right: int, label: int) -> int:
     """Return how often `label` occurs in a window."""
     n = 0

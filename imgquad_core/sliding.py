@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .jit import kernel
+from .jit import kernel, verb
 from .model import PointKind
 from .relaxation import GUARD, HALVINGS, Rings, ring_energy, ring_quality
 
@@ -38,7 +38,7 @@ def slide(points: Points, rings: Rings, kind: NDArray[np.uint8], offsets: Ids, i
                 _slide_node(points, rings, v, ids[i - 1], ids[i + 1], gone, energy)
 
 
-@kernel
+@verb
 def _slide_node(points: Points, rings: Rings, v: int, p: int, n: int, gone: Points, energy: Points) -> None:
     """Move node v parallel to the line from p to n by one guarded Newton step."""
     quality = ring_quality(points, rings, v)

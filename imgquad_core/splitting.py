@@ -67,7 +67,8 @@ def _split_composed(
     capacity = n + 3 * n_triangles + n_triangles + 1
     new_points = np.empty((capacity, 2))
     origin = np.full(capacity, -1, np.int64)
-    new_points[:n] = points
+    for v in range(n):
+        new_points[v, 0], new_points[v, 1] = points[v, 0], points[v, 1]
     mid = np.full(3 * n_triangles, -1, np.int64)
     flat = triangles.ravel()
     count = n
@@ -139,7 +140,8 @@ def _split_quads(points: Points, quads: Ids, twins: Ids, middle: Ids) -> tuple[P
     """Return points, quads (four for each one, beginning at its corners) and origin of the new points."""
     n, n_quads = len(points), len(quads)
     new_points = np.empty((n + 5 * n_quads, 2))
-    new_points[:n] = points
+    for v in range(n):
+        new_points[v, 0], new_points[v, 1] = points[v, 0], points[v, 1]
     origin = np.full(n + 5 * n_quads, -1, np.int64)
     mid = np.full(4 * n_quads, -1, np.int64)
     flat = quads.ravel()

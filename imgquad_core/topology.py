@@ -10,7 +10,7 @@ Rim nodes (on constraints) never move and never vanish; `wanted` tells how many 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ from .cavity import (
     scratch,
     settle,
 )
-from .jit import kernel
+from .jit import inlined, kernel, verb
 from .patterns import MAX_CORNERS, Canvas, choose_cut, cut_quads, draw_cut, piece_fits, smooth_drawn
 from .relaxation import quad_area, quad_quality
 from .splitting import FaceQuads
@@ -82,7 +82,7 @@ def clean_up(mesh: FaceQuads, how: CleanUp) -> FaceQuads:
     return compact(net, mesh)
 
 
-@kernel
+@verb
 def _cost_then(net: Net, cavity: Cavity, inner: int) -> int:
     """Irregularity with a pattern that has `inner` irregular nodes, one quad at each corner and two beside sides."""
     cost, c = inner, 0
@@ -95,7 +95,7 @@ def _cost_then(net: Net, cavity: Cavity, inner: int) -> int:
     return cost
 
 
-@kernel
+@verb
 def _mean_edge(points: Points, cavity: Cavity) -> float:
     total, n = 0.0, cavity.count[OUTLINE]
     for i in range(n):
@@ -126,7 +126,7 @@ def _is_better(net: Net, cavity: Cavity, canvas: Canvas, gain: int, tolerance: f
     return new_sum <= old_sum + tolerance * gain
 
 
-@kernel
+@inlined
 def _has_room(net: Net, cavity: Cavity, cut: Ids) -> bool:
     """Whether the pattern has about as many quads as the cavity, and mesh and rings can hold it."""
     quads = cut_quads(cavity.length, cavity.count[CORNERS], cut)
@@ -141,7 +141,7 @@ def _has_room(net: Net, cavity: Cavity, cut: Ids) -> bool:
     return True
 
 
-@kernel
+@inlined
 def _choose(net: Net, cavity: Cavity, cut: Ids, last_gain: int, last_size: int) -> int:
     """Return the gain of the best pattern for the cavity's outline, 0 where none helps; `cut` tells how it is cut."""
     n = cavity.count[CORNERS]
@@ -172,8 +172,7 @@ def _clean_pass(net: Net, cavity: Cavity, canvas: Canvas, largest: int, toleranc
             continue
         begin(cavity)
         add_ring(net, cavity, v)
-        zero: Any = np.int64(0)  # typed: a literal would compile the callee once more
-        last_gain, last_size = zero, zero
+        last_gain, last_size = 0, 0
         while settle(net, cavity, largest, FLAT):
             gain = _choose(net, cavity, cut, last_gain, last_size)
             if gain > 0:

@@ -44,7 +44,7 @@ def announce_compiling() -> None:
     from imgquad_core.jit import share_on_disk
 
     if share_on_disk() < 0.5:
-        Console(stderr=True).print("first run on this machine: compiling the kernels takes a minute or two, once")
+        Console(stderr=True).print("first run on this machine: compiling the kernels takes about half a minute, once")
 
 
 def print_report(report: dict[str, Any]) -> None:

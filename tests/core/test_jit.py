@@ -1,0 +1,81 @@
+"""The three ways to compile, and the second process at the first start."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from imgquad_core.jit import inlined, kernel, share_on_disk, verb
+from imgquad_core.meshing import mesh_boundaries  # noqa: F401  (imports kernels)
+
+
+@verb
+def _double(x: float) -> float:
+    return 2.0 * x
+
+
+@inlined
+def _plus(x: float, y: int) -> float:
+    return x + y
+
+
+@kernel
+def _use_both(x: float) -> float:
+    return _plus(_double(x), 1) + _plus(x, 2)
+
+
+def test_kernels_use_verbs_and_inlined_steps() -> None:
+    assert _use_both(1.5) == 7.5
+
+
+def test_a_verb_refuses_calls_from_python() -> None:
+    _use_both(1.0)  # compiled or not: the answer is the same
+    with pytest.raises(TypeError, match="_double is a verb"):
+        _double(1.0)
+
+
+def test_written_numbers_do_not_compile_a_kernel_again() -> None:
+    @kernel
+    def add(a: int, b: int) -> int:
+        return a + b
+
+    @kernel
+    def sums(x: int) -> int:
+        return add(x, 1) + add(x, 2) + add(3, x)
+
+    assert sums(1) == 9
+    assert len(add.signatures) == 1
+
+
+def test_the_share_on_disk_is_a_share() -> None:
+    assert 0.0 <= share_on_disk() <= 1.0
+
+
+ASIDE = """
+from imgquad_core import aside, mesh_image, MeshOptions, relaxation, repair, sliding, topology
+import numpy as np
+aside.compile_last_stages()
+kernels = [k for m in (relaxation, repair, sliding, topology) for k in vars(m).values() if hasattr(k, "signatures")]
+before = {id(k): len(k.signatures) for k in kernels}
+labels = np.zeros((40, 60), np.int32)
+labels[10:30, 15:40] = 1
+mesh_image(labels, MeshOptions(size=2.0))
+print(sorted(k.__name__ for k in kernels if before[id(k)] and len(k.signatures) > before[id(k)]))
+print(sum(n > 0 for n in before.values()) > 20)
+"""
+
+
+def test_the_second_process_compiles_what_the_first_one_calls() -> None:
+    done = subprocess.run([sys.executable, "-c", ASIDE], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["[]", "True"]
+
+
+def test_arrays_that_may_be_read_only_compile_no_kernel_again() -> None:
+    from imgquad_core.relaxation import rings_of
+
+    quads = np.array([[0, 1, 2, 3]])
+    quads.flags.writeable = False
+    assert rings_of(quads, 4).quads.flags.writeable
