@@ -28,10 +28,10 @@ def start() -> subprocess.Popen[bytes] | None:
     if embedded or (os.cpu_count() or 1) == 1 or share_on_disk() >= FIRST_START:
         return None
     folders = [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
-    silent = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, folders))}
     try:
-        return subprocess.Popen([str(interpreter), "-m", __name__], env=environment, **silent)
+        none = subprocess.DEVNULL
+        return subprocess.Popen([interpreter, "-m", __name__], env=environment, stdin=none, stdout=none, stderr=none)
     except OSError:
         return None
 

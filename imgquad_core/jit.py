@@ -37,8 +37,9 @@ def inlined(function: F) -> F:
 
 
 def _compiled(function: F, **flags: Any) -> F:
-    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **flags)(function)
-    if numba.config.DISABLE_JIT:
+    flags |= {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    compiled: Any = numba.njit(**flags)(function)
+    if not hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT: the function itself
         return compiled  # type: ignore[no-any-return]
     _ignore_literals(compiled)
     if flags.get("no_cpython_wrapper"):
