@@ -82,10 +82,22 @@ def test_boundary_points_keep_their_ids_and_only_those_inside_chains_slide(seed:
         old = graph.chain(c)
         new = mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]
         assert np.array_equal(new[new < n], old)
-        assert len(new) == len(old) or len(old) == 3, "only a chain of two edges may get more"
+        assert len(new) == len(old) or len(old) == 3, "a smooth chain gets no more edges, if it has more than two"
         way = np.hypot(*(mesh.points[old[1:-1]] - graph.points[old[1:-1]]).T)
         edge = np.hypot(*np.diff(graph.points[old], axis=0).T)
         assert (way <= (0.35 if effort != "fast" else 0.0) * np.maximum(edge[:-1], edge[1:])).all()
+
+
+def test_boundary_points_are_met_however_the_boundary_bends() -> None:
+    labels = np.random.default_rng(1).integers(0, 3, (40, 40))
+    graph = boundaries(label_image(labels), 5.0)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"))
+    n = len(graph.points)
+    assert len(mesh.points[mesh.point_kind != PointKind.INTERIOR]) > n, "no point folded a quad: take another picture"
+    assert mesh.points[:n].tobytes() == graph.points.tobytes()
+    for c in range(graph.n_chains):
+        new = mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]
+        assert np.array_equal(new[new < n], graph.chain(c))
 
 
 def test_boundary_nodes_on_the_frame_stay_on_it() -> None:
