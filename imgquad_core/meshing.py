@@ -49,7 +49,8 @@ STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
-POOR = 0.5  # scaled Jacobian below which single quads are replaced
+POOR = 0.7  # scaled Jacobian below which single quads are replaced
+FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
 REFITS = 16  # rounds in which edges are halved beside boundary points that fold a quad,
 PATIENCE = 6  # of them without reaching farther
 CONTRADICTIONS = 6  # rounds in which chains are halved whose coarse outlines contradict each other
@@ -367,6 +368,7 @@ def _slid(mesh: QuadMesh, rounds: int) -> QuadMesh:
     for _ in range(rounds):
         slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
         newton(points, rings, free, 2, GOOD)
+    untangle(points, rings, free, 2, FAIR)
     return replace(mesh, points=points)
 
 
