@@ -35,6 +35,7 @@ from .outline import (
     wide_faces,
     with_short_chains_halved,
 )
+from .quality import scaled_jacobian
 from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
 from .repair import repair
 from .sliding import slide
@@ -49,6 +50,7 @@ STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
+WORST = 0.3  # the same in the end, at points that folded quads: below it the boundary is refined there
 POOR = 0.7  # scaled Jacobian below which single quads are replaced
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
 REFITS = 16  # rounds in which edges are halved beside boundary points that fold a quad,
@@ -256,7 +258,11 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
             twins = twins_of(part.quads, len(part.points))
             part = split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
         part, late = _fitted(part, graph.points)
-        return _without_poor(_relaxed(part, 8, 6)), late
+        points = part.points.copy()
+        points[late] = graph.points[part.origin[late]]  # whatever they fold: that is replaced
+        late = part.origin[late]
+        part = _without_poor(_relaxed(part._replace(points=points), 8, 6))
+        return part, late[np.isin(late, part.origin[_poor_rim(part)])]
 
     done = in_batches(composed, finish, options.threads)
     quads = joined([part for part, _ in done])
@@ -294,12 +300,12 @@ def _largest_sizes(cut: CutMesh, sizes: Points) -> Points:
 
 
 def _fitted(part: FaceQuads, targets: Points) -> tuple[FaceQuads, Ids]:
-    """Move the rim to the boundary's points; return also those points that could not be met."""
+    """Move the rim to the boundary's points; return also those nodes that would fold quads there."""
     rim = part.origin >= 0
     points = part.points.copy()
     late = fit_rim(points, rings_of(part.quads, len(points)), rim, targets[part.origin], FIT_ROUNDS)
     wanted = np.where(rim, wanted_quads(sector_angles(points, part.quads)), INNER_VALENCE)
-    return part._replace(points=points, wanted=wanted), part.origin[late]
+    return part._replace(points=points, wanted=wanted), np.flatnonzero(late)
 
 
 def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int) -> FaceQuads:
@@ -316,6 +322,14 @@ def _without_poor(part: FaceQuads) -> FaceQuads:
     """Replace the worst quads and smooth what is new."""
     better = repair(part, POOR)
     return part if better is part else _relaxed(better, 3, 6)
+
+
+def _poor_rim(part: FaceQuads) -> Ids:
+    """Return the rim nodes with a quad below `WORST`."""
+    quality = scaled_jacobian(part.points, part.quads)
+    poor = np.zeros(len(part.points), bool)
+    poor[part.quads[quality < WORST]] = True
+    return np.flatnonzero(poor & (part.origin >= 0))
 
 
 def _faces_at(graph: BoundaryGraph, points: Ids) -> Flags:
