@@ -19,6 +19,7 @@ STAIR_NOISE = 0.33  #: px; steps of a digital straight line have a deviation of 
 _EVERY = 4  # windows are chosen at every 4th point
 _DARING = 20.0  # wider ones only if the last two did
 _SLOPE = 0.5  # and change by this much a px of arc
+_SINGULAR = 1e-9  # least determinant of moments over the product of their diagonal: two samples fix no quadratic
 _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are: regression would let them collapse
 
 
@@ -62,7 +63,7 @@ def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: 
 
 @verb
 def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
-    """Coefficients of the quadratic with moments m[0:5] and right-hand side b (Cramer)."""
+    """Coefficients of the quadratic with moments m[0:5] and right-hand side b (Cramer); 0 if too few samples tell."""
     a00 = m[2] * m[4] - m[3] * m[3]
     a01 = m[2] * m[3] - m[1] * m[4]
     a02 = m[1] * m[3] - m[2] * m[2]
@@ -70,6 +71,8 @@ def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, fl
     a12 = m[1] * m[2] - m[0] * m[3]
     a22 = m[0] * m[2] - m[1] * m[1]
     det = m[0] * a00 + m[1] * a01 + m[2] * a02
+    if not det > _SINGULAR * m[0] * m[2] * m[4]:
+        return 0.0, 0.0, 0.0
     return (
         (a00 * b0 + a01 * b1 + a02 * b2) / det,
         (a01 * b0 + a11 * b1 + a12 * b2) / det,

@@ -24,7 +24,19 @@ from .errors import InputError, TopologyError
 from .frontal import frontal_points, wanted_quads
 from .halfedge import twins_of
 from .model import BoundaryGraph, Materials, PointKind, QuadMesh
-from .outline import Flags, Outline, chains_of, coarse_segments, halved, outline, wide_faces, with_short_chains_halved
+from .outline import (
+    Flags,
+    Outline,
+    chains_in_conflict,
+    chains_of,
+    coarse_segments,
+    halved,
+    outline,
+    refined,
+    wide_faces,
+    with_short_chains_halved,
+)
+from .quality import scaled_jacobian
 from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
 from .repair import repair
 from .sliding import slide
@@ -39,8 +51,12 @@ STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
-POOR = 0.5  # scaled Jacobian below which single quads are replaced
-REFITS = 12  # rounds in which boundary points that fold a quad go back to the chord
+WORST = 0.3  # the same in the end, at points that folded quads: below it the boundary is refined there
+POOR = 0.7  # scaled Jacobian below which single quads are replaced
+FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
+REFITS = 16  # rounds in which edges are halved beside boundary points that fold a quad,
+PATIENCE = 6  # of them without reaching farther
+CONTRADICTIONS = 6  # rounds in which chains are halved whose coarse outlines contradict each other
 
 
 class Effort(NamedTuple):
@@ -137,7 +153,7 @@ def mesh_boundaries(
     -------
     QuadMesh
         Convex, counter-clockwise quads. The points of `graph` come first, in their order; those inside chains may
-        have slid along them, and chains of two edges may have got more.
+        have slid along them, and some edges may have got a mid-point.
 
     Raises
     ------
@@ -146,48 +162,61 @@ def mesh_boundaries(
     """
     aside.start()
     options = options or MeshingOptions()
-    graph = with_short_chains_halved(_consistent(graph), LEAST_WIDTH)
-    for _ in range(REFITS):
-        parts, stuck = _mesh_faces(graph, options)
+    graph = with_short_chains_halved(_consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTH)
+    parts: list[FaceQuads] = []
+    todo = np.ones(len(graph.region_label), bool)
+    for attempt in range(REFITS + 1):
+        done, stuck = _mesh_faces(graph, todo, options)
+        parts += done
         if len(stuck) == 0:
             mesh = _stitch(graph, parts, materials or _materials_of(graph.region_label))
             return _slid(mesh, EFFORTS[options.effort].slides)
-        graph = _on_chords(graph, stuck)
+        finer = _refined(graph, stuck, attempt)
+        finer = _consistent(finer, _differ(graph, finer))
+        todo = _faces_beside(graph, _differ(graph, finer))
+        parts = [faces_only(part, ~todo) for part in parts]
+        graph = finer
     raise TopologyError(f"{len(stuck)} boundary points fold quads, the first at {graph.points[stuck[0]].tolist()}")
 
 
-def _consistent(graph: BoundaryGraph) -> BoundaryGraph:
-    """Return the graph, with finer chains where the coarse outlines contradict each other."""
-    for _ in range(3):
-        chords = coarse_segments(graph, np.ones(graph.n_chains, bool), 2)
-        pairs = np.sort(np.stack([chords.tail, chords.head], axis=1), axis=1)
-        _, which, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-        double = count[which.ravel()] > 1
-        bad = np.zeros(graph.n_chains, bool)
-        bad[chords.chain[double]] = True
+def _refined(graph: BoundaryGraph, stuck: Ids, attempt: int) -> BoundaryGraph:
+    """Return the graph with halved edges beside points that fold quads.
+
+    A halved edge is straight, so nothing is left to be met there. After some attempts the reach grows, and in the end
+    all edges are halved: that settles it whatever the picture.
+    """
+    if attempt == REFITS - 1:
+        return halved(graph, np.ones(graph.n_chains, bool))
+    return refined(graph, stuck, 2 ** max(attempt - PATIENCE, 0) - 1)
+
+
+def _differ(graph: BoundaryGraph, finer: BoundaryGraph) -> Flags:
+    """Return which chains have more points in the finer graph."""
+    return np.asarray(np.diff(finer.chain_offsets) != np.diff(graph.chain_offsets))
+
+
+def _consistent(graph: BoundaryGraph, new: Flags) -> BoundaryGraph:
+    """Return the graph, with finer chains where coarse outlines of the new ones contradict each other or others."""
+    for _ in range(CONTRADICTIONS):
+        bad = chains_in_conflict(graph, coarse_segments(graph, np.ones(graph.n_chains, bool), 2), new)
         if not bad.any():
-            try:
-                everything = np.ones(len(graph.region_label), bool)
-                flat = outline(graph, everything, 2)
-                cut = cut_at_constraints(triangulate(flat.points, flat.segments), flat.constraints)
-            except TopologyError:
-                bad[:] = True
-            else:
-                if not isinstance(cut, FaceConflict):
-                    return graph
-                faces = np.zeros(len(graph.region_label), bool)
-                faces[cut.regions] = True
-                bad = chains_of(graph, faces)
-        graph = halved(graph, bad)
+            flat = outline(graph, _faces_beside(graph, new), 2)
+            cut = cut_at_constraints(triangulate(flat.points, flat.segments), flat.constraints)
+            if not isinstance(cut, FaceConflict):
+                return graph
+            faces = np.zeros(len(graph.region_label), bool)
+            faces[cut.regions] = True
+            bad = chains_of(graph, faces)
+        graph, new = halved(graph, bad), new | bad
     raise TopologyError("the boundaries of the regions cross or contradict each other")
 
 
-def _mesh_faces(graph: BoundaryGraph, options: MeshingOptions) -> tuple[list[FaceQuads], Ids]:
-    """Mesh all faces on their levels; return their quads and the boundary points that could not be met."""
+def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> tuple[list[FaceQuads], Ids]:
+    """Mesh flagged faces on their levels; return their quads and the boundary points that could not be met."""
     effort = EFFORTS[options.effort]
-    wide = wide_faces(graph, LEAST_WIDTH)
+    wide = wide_faces(graph, LEAST_WIDTH) & todo
     coarse = _mesh_wide(graph, wide, effort.wide, options)
-    fine = _mesh_level(graph, ~wide | (coarse.worst < effort.again_below), 2, effort.narrow, options)
+    fine = _mesh_level(graph, todo & (~wide | (coarse.worst < effort.again_below)), 2, effort.narrow, options)
     better = fine.meshed & ~(wide & (coarse.worst >= fine.worst))
     stuck = fine.late[_bounds_any(graph, fine.late, better)]
     return [faces_only(coarse.quads, ~better), faces_only(fine.quads, better)], stuck
@@ -225,15 +254,18 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
     middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)
 
     def finish(part: FaceQuads) -> tuple[FaceQuads, Ids]:
-        part, late = _fitted(part, graph.points)
+        part, _ = _fitted(part, graph.points)
         part = clean_up(_relaxed(part, 3, 0), how)
         if stride == 4:
             part = _relaxed(part, 3, 0)
             twins = twins_of(part.quads, len(part.points))
             part = split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
-            part, later = _fitted(part, graph.points)
-            late = np.concatenate([late, later])
-        return _without_poor(_relaxed(part, 8, 6)), late
+        part, late = _fitted(part, graph.points)
+        points = part.points.copy()
+        points[late] = graph.points[part.origin[late]]  # whatever they fold: that is replaced
+        late = part.origin[late]
+        part = _without_poor(_relaxed(part._replace(points=points), 8, 6))
+        return part, late[np.isin(late, part.origin[_poor_rim(part)])]
 
     done = in_batches(composed, finish, options.threads)
     quads = joined([part for part, _ in done])
@@ -271,12 +303,12 @@ def _largest_sizes(cut: CutMesh, sizes: Points) -> Points:
 
 
 def _fitted(part: FaceQuads, targets: Points) -> tuple[FaceQuads, Ids]:
-    """Move the rim to the boundary's points; return also those points that could not be met."""
+    """Move the rim to the boundary's points; return also those nodes that would fold quads there."""
     rim = part.origin >= 0
     points = part.points.copy()
     late = fit_rim(points, rings_of(part.quads, len(points)), rim, targets[part.origin], FIT_ROUNDS)
     wanted = np.where(rim, wanted_quads(sector_angles(points, part.quads)), INNER_VALENCE)
-    return part._replace(points=points, wanted=wanted), part.origin[late]
+    return part._replace(points=points, wanted=wanted), np.flatnonzero(late)
 
 
 def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int) -> FaceQuads:
@@ -295,14 +327,20 @@ def _without_poor(part: FaceQuads) -> FaceQuads:
     return part if better is part else _relaxed(better, 3, 6)
 
 
+def _poor_rim(part: FaceQuads) -> Ids:
+    """Return the rim nodes with a quad below `WORST`."""
+    quality = scaled_jacobian(part.points, part.quads)
+    poor = np.zeros(len(part.points), bool)
+    poor[part.quads[quality < WORST]] = True
+    return np.flatnonzero(poor & (part.origin >= 0))
+
+
 def _faces_at(graph: BoundaryGraph, points: Ids) -> Flags:
     """Return which faces have one of these boundary points on their outline."""
     hit = np.zeros(len(graph.points), bool)
     hit[points] = True
-    chain = np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets))
-    faces = np.zeros(len(graph.region_label) + 1, bool)
-    faces[graph.chain_regions[chain[hit[graph.chain_points]]]] = True
-    return faces[:-1]
+    places = np.add.reduceat(hit[graph.chain_points], graph.chain_offsets[:-1])
+    return _faces_beside(graph, places > 0)
 
 
 def _bounds_any(graph: BoundaryGraph, points: Ids, faces: Flags) -> Flags:
@@ -312,15 +350,11 @@ def _bounds_any(graph: BoundaryGraph, points: Ids, faces: Flags) -> Flags:
     return np.asarray(chains_of(graph, faces)[chain_of[points]])
 
 
-def _on_chords(graph: BoundaryGraph, points: Ids) -> BoundaryGraph:
-    """Return the graph with these odd-place points half-way between their neighbours on the chain."""
-    moved = graph.points.copy()
-    hit = np.zeros(len(moved), bool)
-    hit[points] = True
-    at = np.flatnonzero(hit[graph.chain_points])
-    ids = graph.chain_points
-    moved[ids[at]] = 0.5 * (graph.points[ids[at - 1]] + graph.points[ids[at + 1]])
-    return replace(graph, points=moved)
+def _faces_beside(graph: BoundaryGraph, chains: Flags) -> Flags:
+    """Return which faces have one of these chains on their outline."""
+    faces = np.zeros(len(graph.region_label) + 1, bool)  # VOID is the last entry
+    faces[graph.chain_regions[chains]] = True
+    return faces[:-1]
 
 
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
@@ -351,6 +385,7 @@ def _slid(mesh: QuadMesh, rounds: int) -> QuadMesh:
     for _ in range(rounds):
         slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
         newton(points, rings, free, 2, GOOD)
+    untangle(points, rings, free, 2, FAIR)
     return replace(mesh, points=points)
 
 

@@ -79,7 +79,7 @@ def wide_faces(graph: BoundaryGraph, least_width: float) -> Flags:
     fits = _edges(graph) % 4 == 0
     segments = coarse_segments(graph, fits, 4)
     length = np.hypot(*(graph.points[segments.head] - graph.points[segments.tail]).T)
-    fits &= ~_chains_in_conflict(graph, segments, length)
+    fits &= ~chains_in_conflict(graph, segments, np.ones(graph.n_chains, bool))
     wide = _width(graph, segments, length) >= least_width
     for side in (0, 1):
         at = graph.chain_regions[:, side]
@@ -115,16 +115,18 @@ def _per_face(graph: BoundaryGraph, per_chain: NDArray[Any]) -> NDArray[Any]:
     return total[:-1]
 
 
-def _chains_in_conflict(graph: BoundaryGraph, segments: Segments, length: Points) -> Flags:
-    """Return which chains have chords that cross others, or that join the same points as another chord."""
+def chains_in_conflict(graph: BoundaryGraph, segments: Segments, new: Flags) -> Flags:
+    """Return which chains have chords that cross, have no length, or join the same points as another chord.
+
+    Crossings are looked for where at least one of both chords is on a new chain.
+    """
     bad = np.zeros(graph.n_chains, bool)
     pairs = np.stack([segments.tail, segments.head], axis=1)
-    marks = find_conflicts(graph.points, pairs, segments.chain, np.ones(graph.n_chains, bool), graph.shape)
+    marks = find_conflicts(graph.points, pairs, segments.chain, new, graph.shape)
     bad[segments.chain[marks == CROSSING]] = True
     pairs = np.sort(pairs, axis=1)
     _, first, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     bad[segments.chain[count[first.ravel()] > 1]] = True
-    bad[segments.chain[length == 0.0]] = True
     return bad
 
 
@@ -138,22 +140,49 @@ def _width(graph: BoundaryGraph, segments: Segments, length: Points) -> Points:
 
 def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
     """Return the graph with a mid-point on every edge of the flagged chains."""
+    return _split(graph, chains[_chain_of_places(graph)])
+
+
+def refined(graph: BoundaryGraph, points: Ids, reach: int) -> BoundaryGraph:
+    """Return the graph with mid-points on the edges beside these odd-place points, which so get even places.
+
+    The `reach` segments before and after are halved, too. Chains keep their multiples of four: what is halved there
+    are the four edges of each stride-4 segment.
+    """
+    hit = np.zeros(len(graph.points), bool)
+    hit[points] = True
+    at = np.flatnonzero(hit[graph.chain_points])
+    chain = _chain_of_places(graph)[at]
+    stride = np.where(_edges(graph)[chain] % 4 == 0, 4, 2)
+    begin, end = graph.chain_offsets[chain], graph.chain_offsets[chain + 1] - 1
+    first = at - (at - begin) % stride
+    split = np.zeros(len(graph.chain_points) + 1, np.int64)
+    np.add.at(split, np.maximum(first - reach * stride, begin), 1)
+    np.add.at(split, np.minimum(first + (reach + 1) * stride, end), -1)
+    return _split(graph, np.cumsum(split)[:-1] > 0)
+
+
+def _chain_of_places(graph: BoundaryGraph) -> Ids:
+    """Return the chain of each entry of `chain_points`."""
+    return np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets))
+
+
+def _split(graph: BoundaryGraph, split: Flags) -> BoundaryGraph:
+    """Return the graph with a mid-point on the edges behind the flagged entries of `chain_points`."""
     offsets, ids = graph.chain_offsets, graph.chain_points
-    counts = np.diff(offsets)
-    n = len(graph.points)
-    chain = np.repeat(np.arange(graph.n_chains), counts)
-    split = chains[chain].copy()
+    n, chain = len(graph.points), _chain_of_places(graph)
+    split = split.copy()
     split[offsets[1:] - 1] = False  # no edge behind the last point of a chain
     at = np.flatnonzero(split)
     new = n + np.arange(len(at))
     points = np.vstack([graph.points, 0.5 * (graph.points[ids[at]] + graph.points[ids[at + 1]])])
     straight = np.isin(graph.chain_regions, VOID).any(axis=1)[chain[at]]
     kind = np.where(straight & _on_frame(points[n:], graph.shape), 2, 0)
-    new_counts = counts + np.bincount(chain[at], minlength=graph.n_chains)
+    counts = np.diff(offsets) + np.bincount(chain[at], minlength=graph.n_chains)
     return BoundaryGraph(
         points,
         np.concatenate([graph.point_kind, kind]),
-        np.concatenate([[0], np.cumsum(new_counts)]),
+        np.concatenate([[0], np.cumsum(counts)]),
         np.insert(ids, at + 1, new),
         graph.chain_regions,
         graph.region_label,

@@ -31,13 +31,14 @@ from .cavity import (
     scratch,
     settle,
 )
-from .jit import kernel, verb
+from .jit import inlined, kernel, verb
 from .patterns import Canvas
 from .relaxation import quad_quality
 from .splitting import FaceQuads
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 LARGEST = 24  # quads of a cavity
 LONGEST = 16  # nodes of an outline
@@ -46,7 +47,7 @@ ANY = 99  # quads that a node of the outline may need: valences do not count her
 ROUNDS = 3
 COLLAPSE = 6  # the first of two trials that collapse the quad
 ATTEMPTS = 3 * (COLLAPSE + 2)  # three fillings of each trial's outline
-CENTRE_STEPS = 24
+CENTRE_STEPS = 8
 
 
 def repair(mesh: FaceQuads, below: float) -> FaceQuads:
@@ -55,9 +56,9 @@ def repair(mesh: FaceQuads, below: float) -> FaceQuads:
         return mesh
     net = net_of(mesh, LARGEST)
     cavity, canvas = scratch(net, LARGEST)
-    changed = 0
+    changed, hopeless = 0, np.zeros(len(net.quads), np.bool_)
     for _ in range(ROUNDS):
-        done = _repair_pass(net, cavity, canvas, below)
+        done = _repair_pass(net, cavity, canvas, below, hopeless)
         changed += done
         if done == 0:
             break
@@ -65,15 +66,18 @@ def repair(mesh: FaceQuads, below: float) -> FaceQuads:
 
 
 @verb
-def _best_fill(points: Points, loop: Ids, n: int, best: Points, first: Ids, second: Ids) -> float:
-    """Fill the tables of the best quads for each run of an outline; return the worst quality of the best filling."""
+def _best_fill(points: Points, loop: Ids, n: int, floor: float, best: Points, first: Ids, second: Ids) -> float:
+    """Fill the tables of the best quads for each run of an outline; return the worst quality of the best filling.
+
+    Only fillings better than `floor` count; -2 where there is none.
+    """
     corners = np.empty((1, 4), np.int64)
     for i in range(n - 1):
         best[i, i + 1] = 1.0
     for run in range(3, n, 2):
         for i in range(n - run):
             j = i + run
-            best[i, j] = -2.0
+            best[i, j] = floor
             for a in range(i + 1, j, 2):
                 for b in range(a + 1, j, 2):
                     rest = min(best[i, a], min(best[a, b], best[b, j]))
@@ -83,7 +87,7 @@ def _best_fill(points: Points, loop: Ids, n: int, best: Points, first: Ids, seco
                     worst = min(rest, quad_quality(points, corners, 0))
                     if worst > best[i, j]:
                         best[i, j], first[i, j], second[i, j] = worst, a, b
-    return float(best[0, n - 1])
+    return float(best[0, n - 1]) if best[0, n - 1] > floor else -2.0
 
 
 @verb
@@ -109,14 +113,17 @@ def _draw_fill(canvas: Canvas, loop: Ids, n: int, first: Ids, second: Ids) -> No
 
 
 @verb
-def _worst_drawn(canvas: Canvas) -> float:
+def _worst_drawn(canvas: Canvas, floor: float) -> float:
+    """Return the worst quality of the drawn quads, or one that is not above `floor`."""
     worst = 1.0
     for q in range(canvas.count[1]):
         worst = min(worst, quad_quality(canvas.points, canvas.quads, q))
+        if worst <= floor:
+            break
     return worst
 
 
-@verb
+@inlined
 def _draw_star(canvas: Canvas, loop: Ids, n: int, turn: int) -> float:
     """Draw a star whose centre is joined to the nodes turn, turn + 2, ...; return its worst quality."""
     canvas.count[0], canvas.count[1] = 1, n // 2
@@ -140,14 +147,14 @@ def _draw_star(canvas: Canvas, loop: Ids, n: int, turn: int) -> float:
 def _centred(canvas: Canvas, reach: float) -> float:
     """Move the drawn point to where the worst quality is best; return that."""
     o = canvas.first
-    best, step = _worst_drawn(canvas), 0.3 * reach
+    best, step = _worst_drawn(canvas, -1.0), 0.3 * reach
     for _ in range(CENTRE_STEPS):
         x, y = canvas.points[o, 0], canvas.points[o, 1]
         best_x, best_y = x, y
         for d in range(8):
             angle = d * np.pi / 4
             canvas.points[o, 0], canvas.points[o, 1] = x + step * np.cos(angle), y + step * np.sin(angle)
-            worst = _worst_drawn(canvas)
+            worst = _worst_drawn(canvas, best)
             if worst > best + 1e-9:
                 best, best_x, best_y = worst, canvas.points[o, 0], canvas.points[o, 1]
         canvas.points[o, 0], canvas.points[o, 1] = best_x, best_y
@@ -186,7 +193,7 @@ def _worst_member(net: Net, cavity: Cavity) -> float:
     return worst
 
 
-@verb
+@inlined
 def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) -> float:
     """Draw the cavity with corners k and k + 2 of quad q made one node; return its worst quality."""
     a, c = net.quads[q, k], net.quads[q, k + 2]
@@ -209,21 +216,33 @@ def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) ->
             canvas.quads[canvas.count[1], j] = v
         canvas.count[1] += 1
     reach = np.hypot(net.points[a, 0] - net.points[c, 0], net.points[a, 1] - net.points[c, 1])
-    return _centred(canvas, reach) if merged == o else _worst_drawn(canvas)
+    return _centred(canvas, reach) if merged == o else _worst_drawn(canvas, -1.0)
 
 
-@verb
+@inlined
 def _try(
-    net: Net, cavity: Cavity, canvas: Canvas, q: int, trial: int, kind: int, best: Points, first: Ids, second: Ids
+    net: Net,
+    cavity: Cavity,
+    canvas: Canvas,
+    q: int,
+    attempt: int,
+    floor: float,
+    best: Points,
+    first: Ids,
+    second: Ids,
 ) -> float:
-    """Draw a filling of a trial's outline: 0 without a new node, 1 and 2 stars; return its worst quality."""
+    """Draw a filling of a trial's outline: without a new node, or a star; return its worst quality.
+
+    A filling no better than `floor` is of no use.
+    """
+    trial, kind = attempt // 3, attempt % 3
     n = cavity.count[OUTLINE]
     if trial >= COLLAPSE:
         return _draw_collapsed(net, cavity, canvas, q, trial - COLLAPSE) if kind == 0 else -1.0
     if kind > 0:
         return _draw_star(canvas, cavity.loop, n, kind - 1)
-    worst = _best_fill(net.points, cavity.loop, n, best, first, second)
-    if worst > 0.0:
+    worst = _best_fill(net.points, cavity.loop, n, floor, best, first, second)
+    if worst > floor:
         _draw_fill(canvas, cavity.loop, n, first, second)
     return worst
 
@@ -238,8 +257,11 @@ def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
 
 
 @kernel
-def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float) -> int:
-    """Try to replace each quad worse than `below`; return how many cavities were filled anew."""
+def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float, hopeless: Flags) -> int:
+    """Try to replace each quad worse than `below`; return how many cavities were filled anew.
+
+    Quads are hopeless from a vain try on, until something changes beside them.
+    """
     best, first, second = (
         np.empty((LONGEST, LONGEST)),
         np.empty((LONGEST, LONGEST), np.int64),
@@ -248,15 +270,17 @@ def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float) -> int:
     new_id = np.empty(canvas.quads.shape[0], np.int64)
     done = 0
     for q in range(len(net.quads)):
-        if net.quads[q, 0] < 0 or quad_quality(net.points, net.quads, q) >= below:
+        if net.quads[q, 0] < 0 or hopeless[q] or quad_quality(net.points, net.quads, q) >= below:
             continue
+        hopeless[q] = True
         chosen, chosen_attempt = LEAST_GAIN, -1
         for turn in range(ATTEMPTS + 1):  # all attempts, then the best one again
             attempt = turn if turn < ATTEMPTS else chosen_attempt
             if attempt < 0 or not _grow(net, cavity, q, attempt // 3):
                 continue
             worst = _worst_member(net, cavity)
-            gain = min(_try(net, cavity, canvas, q, attempt // 3, attempt % 3, best, first, second), below) - worst
+            floor = worst + (chosen if turn < ATTEMPTS else LEAST_GAIN)
+            gain = min(_try(net, cavity, canvas, q, attempt, floor, best, first, second), below) - worst
             if turn < ATTEMPTS:
                 if gain > chosen:
                     chosen, chosen_attempt = gain, attempt
@@ -264,5 +288,9 @@ def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float) -> int:
                 face = net.face[cavity.members[0]]
                 remove(net, cavity)
                 insert(net, canvas, new_id, face)
+                for i in range(cavity.count[OUTLINE]):
+                    v = cavity.loop[i]
+                    for j in range(net.valence[v]):
+                        hopeless[net.ring[v, j]] = False
                 done += 1
     return done

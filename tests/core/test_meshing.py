@@ -10,7 +10,7 @@ import pytest
 
 import naive
 from faces import Points, graph_of, polygon_graph, voronoi_graph
-from imgquad_core import batches
+from imgquad_core import batches, meshing
 from imgquad_core.boundary import extract_boundaries
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.meshing import EFFORTS, MeshingOptions, mesh_boundaries
@@ -82,10 +82,34 @@ def test_boundary_points_keep_their_ids_and_only_those_inside_chains_slide(seed:
         old = graph.chain(c)
         new = mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]
         assert np.array_equal(new[new < n], old)
-        assert len(new) == len(old) or len(old) == 3, "only a chain of two edges may get more"
+        assert len(new) == len(old) or len(old) == 3, "a smooth chain gets no more edges, if it has more than two"
         way = np.hypot(*(mesh.points[old[1:-1]] - graph.points[old[1:-1]]).T)
         edge = np.hypot(*np.diff(graph.points[old], axis=0).T)
         assert (way <= (0.35 if effort != "fast" else 0.0) * np.maximum(edge[:-1], edge[1:])).all()
+
+
+@pytest.mark.parametrize("size", [2.0, 5.0])
+def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None:
+    graph = boundaries(label_image(np.random.default_rng(1).integers(0, 3, (40, 40))), size)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=size, effort="fast"))
+    assert mesh.points[: len(graph.points)].tobytes() == graph.points.tobytes()
+    assert naive.worst_quality(mesh.points, mesh.quads) > meshing.WORST
+
+
+@pytest.mark.parametrize("refits", [1, meshing.REFITS])
+def test_edges_are_halved_beside_points_that_fold_quads(refits: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    image = label_image(np.random.default_rng(2).integers(0, 3, (40, 40)))
+    graph = boundaries(image, 5.0)
+    monkeypatch.setattr(meshing, "WORST", 0.95)  # so that points count as folding quads that do not
+    monkeypatch.setattr(meshing, "REFITS", refits)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"), image.materials)
+    assert_valid_mesh(mesh, image)
+    n, edges, finer = len(graph.points), np.diff(graph.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
+    assert mesh.points[:n].tobytes() == graph.points.tobytes()
+    assert (finer > edges).any()
+    assert (finer % 2 == 0).all()
+    if refits == 1:
+        assert (finer == 2 * edges).all()
 
 
 def test_boundary_nodes_on_the_frame_stay_on_it() -> None:

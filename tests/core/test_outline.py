@@ -9,7 +9,7 @@ import pytest
 
 from faces import graph_of, polygon_graph, voronoi_graph
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
-from imgquad_core.outline import chains_of, coarse_segments, halved, outline, wide_faces
+from imgquad_core.outline import chains_of, coarse_segments, halved, outline, refined, wide_faces
 
 SQUARE = [[0, 0], [32, 0], [32, 32], [0, 32]]
 
@@ -135,3 +135,33 @@ def test_halving_nothing_changes_nothing() -> None:
     same = halved(graph, ~everything(graph))
     assert same.points.tobytes() == graph.points.tobytes()
     assert np.array_equal(same.chain_points, graph.chain_points)
+
+
+@pytest.mark.parametrize(
+    ("edges", "place", "reach", "split"),
+    [
+        (10, 3, 0, [2, 3]),  # the segment over edges 2 and 3
+        (10, 3, 1, [0, 1, 2, 3, 4, 5]),
+        (10, 9, 1, [6, 7, 8, 9]),  # not past the end of the chain
+        (12, 5, 0, [4, 5, 6, 7]),  # a multiple of four stays one
+        (12, 1, 1, [*range(8)]),
+    ],
+)
+def test_refined_points_get_even_places(edges: int, place: int, reach: int, split: list[int]) -> None:
+    graph = split_square(edges, 3.0)
+    fine = refined(graph, graph.chain(2)[[place]], reach)
+    old, new = graph.chain(2).tolist(), fine.chain(2).tolist()
+    assert new.index(old[place]) % 2 == 0
+    assert len(new) - len(old) == len(split)
+    assert new == with_new(old, split, len(graph.points))
+    assert all(fine.chain(c).tolist() == graph.chain(c).tolist() for c in range(2))
+    for k, v in zip(split, range(len(graph.points), len(fine.points)), strict=True):
+        assert np.allclose(fine.points[v], (graph.points[old[k]] + graph.points[old[k + 1]]) / 2)
+
+
+def with_new(ids: list[int], split: list[int], first_new: int) -> list[int]:
+    """Put a new id behind the first point of each split edge."""
+    out = []
+    for k, v in enumerate(ids):
+        out += [v, first_new + split.index(k)] if k in split else [v]
+    return out

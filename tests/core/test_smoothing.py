@@ -78,6 +78,14 @@ def test_hard_pictures_give_planar_polylines(labels: NDArray[np.int32], size: fl
     check_meshable(smoothed(labels, size))
 
 
+def test_a_window_with_two_samples_leaves_its_point() -> None:
+    # beside the corner of colour 2 a quadratic would be fitted to two mid-sides
+    labels = np.ones((7, 6), np.int32)
+    labels[:3, :3] = labels[3, :4] = 0
+    labels[0, :2] = labels[1, 0] = 2
+    check_meshable(smoothed(labels, 6.0))
+
+
 @pytest.mark.parametrize("size", [0.4, 3.0])
 @pytest.mark.parametrize("rounds", [14, 0])
 def test_hopeless_curves_fall_back_to_the_pixel_boundary(
