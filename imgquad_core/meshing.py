@@ -51,11 +51,12 @@ STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
-WORST = 0.3  # the same in the end, at points that folded quads: below it the boundary is refined there
 POOR = 0.7  # scaled Jacobian below which single quads are replaced
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
-REFITS = 16  # rounds in which edges are halved beside boundary points that fold a quad,
-PATIENCE = 6  # of them without reaching farther
+WORST = 0.3  # below it the boundary's edges at the quad are halved, in
+WISHES = 2  # rounds at most; at folded quads in
+REFITS = 16  # rounds, of which
+PATIENCE = 6  # reach no farther
 CONTRADICTIONS = 6  # rounds in which chains are halved whose coarse outlines contradict each other
 
 
@@ -166,28 +167,41 @@ def mesh_boundaries(
     parts: list[FaceQuads] = []
     todo = np.ones(len(graph.region_label), bool)
     for attempt in range(REFITS + 1):
-        done, stuck = _mesh_faces(graph, todo, options)
+        done = _mesh_faces(graph, todo, options)
         parts += done
-        if len(stuck) == 0:
+        poor = _poor_rim(done, WORST if attempt < WISHES else 0.0)
+        if len(poor) == 0:
             mesh = _stitch(graph, parts, materials or _materials_of(graph.region_label))
             return _slid(mesh, EFFORTS[options.effort].slides)
-        finer = _refined(graph, stuck, attempt)
+        finer = _refined(graph, poor, attempt)
         finer = _consistent(finer, _differ(graph, finer))
         todo = _faces_beside(graph, _differ(graph, finer))
         parts = [faces_only(part, ~todo) for part in parts]
         graph = finer
-    raise TopologyError(f"{len(stuck)} boundary points fold quads, the first at {graph.points[stuck[0]].tolist()}")
+    raise TopologyError(f"{len(poor)} boundary points fold quads, the first at {graph.points[poor[0]].tolist()}")
 
 
-def _refined(graph: BoundaryGraph, stuck: Ids, attempt: int) -> BoundaryGraph:
-    """Return the graph with halved edges beside points that fold quads.
+def _refined(graph: BoundaryGraph, poor: Ids, attempt: int) -> BoundaryGraph:
+    """Return the graph with halved edges beside points with poor quads.
 
-    A halved edge is straight, so nothing is left to be met there. After some attempts the reach grows, and in the end
+    A halved edge is straight, so no point there can fold a quad. After some attempts the reach grows, and in the end
     all edges are halved: that settles it whatever the picture.
     """
     if attempt == REFITS - 1:
         return halved(graph, np.ones(graph.n_chains, bool))
-    return refined(graph, stuck, 2 ** max(attempt - PATIENCE, 0) - 1)
+    return refined(graph, poor, 2 ** max(attempt - PATIENCE, 0) - 1)
+
+
+def _poor_rim(parts: list[FaceQuads], limit: float) -> Ids:
+    """Return the boundary points of quads not above `limit`, and all those of a face whose such quads have none."""
+    found = []
+    for part in parts:
+        poor = np.flatnonzero(scaled_jacobian(part.points, part.quads) <= limit)
+        origin = part.origin[part.quads[poor]]
+        inner = np.setdiff1d(part.face[poor], part.face[poor[(origin >= 0).any(axis=1)]])
+        found += [origin.ravel(), part.origin[part.quads[np.isin(part.face, inner)]].ravel()]
+    points = np.unique(np.concatenate(found))
+    return np.asarray(points[points >= 0])
 
 
 def _differ(graph: BoundaryGraph, finer: BoundaryGraph) -> Flags:
@@ -211,15 +225,14 @@ def _consistent(graph: BoundaryGraph, new: Flags) -> BoundaryGraph:
     raise TopologyError("the boundaries of the regions cross or contradict each other")
 
 
-def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> tuple[list[FaceQuads], Ids]:
-    """Mesh flagged faces on their levels; return their quads and the boundary points that could not be met."""
+def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> list[FaceQuads]:
+    """Mesh flagged faces on their levels."""
     effort = EFFORTS[options.effort]
     wide = wide_faces(graph, LEAST_WIDTH) & todo
     coarse = _mesh_wide(graph, wide, effort.wide, options)
     fine = _mesh_level(graph, todo & (~wide | (coarse.worst < effort.again_below)), 2, effort.narrow, options)
     better = fine.meshed & ~(wide & (coarse.worst >= fine.worst))
-    stuck = fine.late[_bounds_any(graph, fine.late, better)]
-    return [faces_only(coarse.quads, ~better), faces_only(fine.quads, better)], stuck
+    return [faces_only(coarse.quads, ~better), faces_only(fine.quads, better)]
 
 
 class _Level(NamedTuple):
@@ -227,50 +240,38 @@ class _Level(NamedTuple):
 
     quads: FaceQuads
     meshed: Flags  # which faces
-    worst: Points  # scaled Jacobian of each face, -1 where a boundary point could not be met
-    late: Ids  # boundary points that could not be met
+    worst: Points  # scaled Jacobian of each face
 
 
 def _mesh_wide(graph: BoundaryGraph, wide: Flags, how: CleanUp, options: MeshingOptions) -> _Level:
     """Mesh faces with stride 4, without those whose chords contradict each other (`wide` is updated)."""
     while True:
         try:
-            level = _mesh_level(graph, wide, 4, how, options)
+            return _mesh_level(graph, wide, 4, how, options)
         except _Conflict as conflict:
             wide[conflict.regions] = False
-        else:
-            level.worst[_faces_at(graph, level.late)] = -1.0
-            return level
 
 
 def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> _Level:
     """Mesh the flagged faces from segments of `stride` edges."""
     if not faces.any():
-        return _Level(no_quads(), faces, np.full(len(faces), -1.0), np.empty(0, np.int64))
+        return _Level(no_quads(), faces, np.full(len(faces), -1.0))
     composed = _compose(graph, faces, stride, options)
     aside.wait()
     edges = coarse_segments(graph, chains_of(graph, faces), 2)
     nothing = np.zeros(len(edges.tail), np.int64)
     middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)
 
-    def finish(part: FaceQuads) -> tuple[FaceQuads, Ids]:
-        part, _ = _fitted(part, graph.points)
-        part = clean_up(_relaxed(part, 3, 0), how)
+    def finish(part: FaceQuads) -> FaceQuads:
+        part = clean_up(_relaxed(_fitted(part, graph.points, False), 3, 0), how)
         if stride == 4:
             part = _relaxed(part, 3, 0)
             twins = twins_of(part.quads, len(part.points))
             part = split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
-        part, late = _fitted(part, graph.points)
-        points = part.points.copy()
-        points[late] = graph.points[part.origin[late]]  # whatever they fold: that is replaced
-        late = part.origin[late]
-        part = _without_poor(_relaxed(part._replace(points=points), 8, 6))
-        return part, late[np.isin(late, part.origin[_poor_rim(part)])]
+        return _without_poor(_relaxed(_fitted(part, graph.points, True), 8, 6))
 
-    done = in_batches(composed, finish, options.threads)
-    quads = joined([part for part, _ in done])
-    worst = worst_of_faces(quads.points, quads.quads, quads.face, len(faces))
-    return _Level(quads, faces, worst, np.unique(np.concatenate([late for _, late in done])))
+    quads = joined(in_batches(composed, finish, options.threads))
+    return _Level(quads, faces, worst_of_faces(quads.points, quads.quads, quads.face, len(faces)))
 
 
 def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
@@ -302,13 +303,15 @@ def _largest_sizes(cut: CutMesh, sizes: Points) -> Points:
     return sizes[face]
 
 
-def _fitted(part: FaceQuads, targets: Points) -> tuple[FaceQuads, Ids]:
-    """Move the rim to the boundary's points; return also those nodes that would fold quads there."""
+def _fitted(part: FaceQuads, targets: Points, whole: bool) -> FaceQuads:
+    """Move the rim to the boundary's points: as far as no quad folds, or all of it, whatever folds."""
     rim = part.origin >= 0
     points = part.points.copy()
     late = fit_rim(points, rings_of(part.quads, len(points)), rim, targets[part.origin], FIT_ROUNDS)
+    if whole:
+        points[late] = targets[part.origin[late]]
     wanted = np.where(rim, wanted_quads(sector_angles(points, part.quads)), INNER_VALENCE)
-    return part._replace(points=points, wanted=wanted), np.flatnonzero(late)
+    return part._replace(points=points, wanted=wanted)
 
 
 def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int) -> FaceQuads:
@@ -325,29 +328,6 @@ def _without_poor(part: FaceQuads) -> FaceQuads:
     """Replace the worst quads and smooth what is new."""
     better = repair(part, POOR)
     return part if better is part else _relaxed(better, 3, 6)
-
-
-def _poor_rim(part: FaceQuads) -> Ids:
-    """Return the rim nodes with a quad below `WORST`."""
-    quality = scaled_jacobian(part.points, part.quads)
-    poor = np.zeros(len(part.points), bool)
-    poor[part.quads[quality < WORST]] = True
-    return np.flatnonzero(poor & (part.origin >= 0))
-
-
-def _faces_at(graph: BoundaryGraph, points: Ids) -> Flags:
-    """Return which faces have one of these boundary points on their outline."""
-    hit = np.zeros(len(graph.points), bool)
-    hit[points] = True
-    places = np.add.reduceat(hit[graph.chain_points], graph.chain_offsets[:-1])
-    return _faces_beside(graph, places > 0)
-
-
-def _bounds_any(graph: BoundaryGraph, points: Ids, faces: Flags) -> Flags:
-    """Return for each point whether its chain bounds a flagged face (points inside chains only)."""
-    chain_of = np.zeros(len(graph.points), np.int64)
-    chain_of[graph.chain_points] = np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets))
-    return np.asarray(chains_of(graph, faces)[chain_of[points]])
 
 
 def _faces_beside(graph: BoundaryGraph, chains: Flags) -> Flags:

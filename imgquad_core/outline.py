@@ -144,7 +144,7 @@ def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
 
 
 def refined(graph: BoundaryGraph, points: Ids, reach: int) -> BoundaryGraph:
-    """Return the graph with mid-points on the edges beside these odd-place points, which so get even places.
+    """Return the graph with mid-points on the edges of the segments that these points are part of.
 
     The `reach` segments before and after are halved, too. Chains keep their multiples of four: what is halved there
     are the four edges of each stride-4 segment.
@@ -155,10 +155,11 @@ def refined(graph: BoundaryGraph, points: Ids, reach: int) -> BoundaryGraph:
     chain = _chain_of_places(graph)[at]
     stride = np.where(_edges(graph)[chain] % 4 == 0, 4, 2)
     begin, end = graph.chain_offsets[chain], graph.chain_offsets[chain + 1] - 1
-    first = at - (at - begin) % stride
+    into = (at - begin) % stride
+    first = at - into - stride * (reach + (into == 0))  # between two segments: both
     split = np.zeros(len(graph.chain_points) + 1, np.int64)
-    np.add.at(split, np.maximum(first - reach * stride, begin), 1)
-    np.add.at(split, np.minimum(first + (reach + 1) * stride, end), -1)
+    np.add.at(split, np.maximum(first, begin), 1)
+    np.add.at(split, np.minimum(at - into + stride * (reach + 1), end), -1)
     return _split(graph, np.cumsum(split)[:-1] > 0)
 
 

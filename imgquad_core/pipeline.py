@@ -32,6 +32,7 @@ Progress: TypeAlias = Callable[[str, int, int], None]
 
 STAGES = ("read", "segment", "denoise", "boundary", "smooth", "mesh")
 MOST_QUADS = 200_000_000  #: more are refused before memory is
+MANY_TIMES, MANY_QUADS = 4.0, 1000  #: quads over area / size^2, and in all, from which thin features are told
 
 
 @dataclass(frozen=True)
@@ -285,6 +286,32 @@ def fill_boundaries(
             break
         boundary, mesh = again, mesh_boundaries(again, options, materials)
     return boundary, mesh
+
+
+def thin_features(labels: LabelImage, mesh: QuadMesh, options: MeshOptions) -> str | None:
+    """Say how many more quads there are than the sizes asked for would give, with the remedies; None if few.
+
+    Parameters
+    ----------
+    labels : LabelImage
+        The materials as meshed.
+    mesh : QuadMesh
+        Its mesh.
+    options : MeshOptions
+        Sizes in pixels.
+    """
+    sizes = dict.fromkeys(labels.materials.labels.tolist(), options.size)
+    sizes |= {material_number(labels.materials, name): size for name, size in options.material_sizes.items()}
+    expected = sum(
+        np.count_nonzero(labels.labels == number) / min(size, options.boundary_size or size) ** 2
+        for number, size in sizes.items()
+    )
+    if mesh.n_quads <= max(MANY_TIMES * expected, MANY_QUADS):
+        return None
+    return (
+        f"thin features force {mesh.n_quads} quads, {mesh.n_quads / expected:.1f} times area / size^2: "
+        "remove noise (min-pixels, min-length), ask for a smaller size, or drop or merge materials"
+    )
 
 
 class _Stopwatch:

@@ -10,6 +10,7 @@ The core (and Numba with it) is imported by the first call of a filter.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
@@ -395,6 +396,11 @@ def mesh(
     TypeError, ValueError, KeyError, pyvista.core.errors.MissingDataError
         As PyVista's own filters raise them.
 
+    Warns
+    -----
+    UserWarning
+        Thin features force many times more quads than the area over the square of the size.
+
     Examples
     --------
     >>> import numpy as np
@@ -406,7 +412,7 @@ def mesh(
     (-0.5, 59.5, -0.5, 39.5)
     """
     from imgquad_core.boundary import ExtractionOptions
-    from imgquad_core.pipeline import MeshOptions
+    from imgquad_core.pipeline import MeshOptions, thin_features
     from imgquad_core.segmentation import SegmentationOptions
     from imgquad_core.selection import drop_materials as drop_from
     from imgquad_mesh.checks import checked
@@ -433,6 +439,9 @@ def mesh(
         lines = smoothed(lines, options.smoothing(labels.materials), options.periodic)
         begin("mesh")
         made = filled(lines, options.meshing(labels.materials))
+    many = thin_features(labels, made, options)
+    if many:
+        warnings.warn(many, stacklevel=3)  # of the caller of the accessor's method
     grid = to_grid(made, lines.placement)
     _sample(grid, made, columns, lines.graph.shape)
     return grid

@@ -15,6 +15,7 @@ import numpy as np
 from imgquad_core.boundary import extract_boundaries
 from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.model import BoundaryGraph, PointKind
+from imgquad_core.pipeline import thin_features
 from imgquad_core.quality import bad_places, forced_quads, quality_report, scaled_jacobian
 
 if TYPE_CHECKING:
@@ -55,12 +56,9 @@ def notes(run: Run) -> Iterator[str]:
         limits = f"clusters below {run.noise.min_pixels} pixels and shorter than {run.noise.min_length:g} px"
         removed = sum(removal.clusters for removal in run.removed)
         yield f"noise: {removed} {limits} removed, {sum(removal.pixels for removal in run.removed)} pixels"
-    wanted = np.count_nonzero(run.labels.labels >= 0) / run.options.size**2
-    if run.mesh.n_quads > 4 * wanted and run.mesh.n_quads > 1000:
-        yield (
-            f"thin features force {run.mesh.n_quads / wanted:.1f} times as many quads as area / size^2: "
-            "remove noise (--min-pixels, --min-length), or drop or merge materials"
-        )
+    many = thin_features(run.labels, run.mesh, run.options)
+    if many:
+        yield many
 
 
 def versions() -> dict[str, str]:

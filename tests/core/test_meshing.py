@@ -100,7 +100,7 @@ def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None
 def test_edges_are_halved_beside_points_that_fold_quads(refits: int, monkeypatch: pytest.MonkeyPatch) -> None:
     image = label_image(np.random.default_rng(2).integers(0, 3, (40, 40)))
     graph = boundaries(image, 5.0)
-    monkeypatch.setattr(meshing, "WORST", 0.95)  # so that points count as folding quads that do not
+    monkeypatch.setattr(meshing, "WORST", 0.5)  # so that something is worse
     monkeypatch.setattr(meshing, "REFITS", refits)
     mesh = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"), image.materials)
     assert_valid_mesh(mesh, image)

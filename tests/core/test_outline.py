@@ -145,6 +145,8 @@ def test_halving_nothing_changes_nothing() -> None:
         (10, 9, 1, [6, 7, 8, 9]),  # not past the end of the chain
         (12, 5, 0, [4, 5, 6, 7]),  # a multiple of four stays one
         (12, 1, 1, [*range(8)]),
+        (10, 4, 0, [2, 3, 4, 5]),  # between two segments
+        (12, 4, 0, [*range(8)]),
     ],
 )
 def test_refined_points_get_even_places(edges: int, place: int, reach: int, split: list[int]) -> None:
@@ -157,6 +159,13 @@ def test_refined_points_get_even_places(edges: int, place: int, reach: int, spli
     assert all(fine.chain(c).tolist() == graph.chain(c).tolist() for c in range(2))
     for k, v in zip(split, range(len(graph.points), len(fine.points)), strict=True):
         assert np.allclose(fine.points[v], (graph.points[old[k]] + graph.points[old[k + 1]]) / 2)
+
+
+def test_refining_at_a_junction_halves_the_ends_of_all_chains_there() -> None:
+    graph = split_square(10)
+    fine = refined(graph, np.array([0]), 0)
+    assert [len(fine.chain(c)) - len(graph.chain(c)) for c in range(3)] == [4, 4, 2]
+    assert all((np.diff(fine.chain_offsets) - 1) % 2 == 0)
 
 
 def with_new(ids: list[int], split: list[int], first_new: int) -> list[int]:

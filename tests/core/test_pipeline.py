@@ -15,7 +15,7 @@ import imgquad_core
 from imgquad_core.errors import InputError, QualityError
 from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.model import VOID, LabelImage, Materials
-from imgquad_core.pipeline import STAGES, MeshOptions, mesh_image, run
+from imgquad_core.pipeline import STAGES, MeshOptions, mesh_image, run, thin_features
 from imgquad_core.quality import quality_report, require_quality
 from imgquad_core.selection import crop_image, drop_materials, material_number
 from invariants import assert_valid_mesh
@@ -202,3 +202,18 @@ def test_lazy_names_of_the_package() -> None:
     assert imgquad_core.MeshOptions is MeshOptions
     with pytest.raises(AttributeError, match="nothing"):
         _ = imgquad_core.nothing
+
+
+def test_thin_features_are_told_with_their_count_and_the_remedies() -> None:
+    image = label_image(speckles(60, 60, 1))
+    options = MeshOptions(size=6.0, min_pixels=0, min_length=0)
+    done = run(image, options)
+    told = thin_features(done.labels, done.mesh, options)
+    assert told is not None
+    assert f"{done.mesh.n_quads} quads" in told
+    assert f"{done.mesh.n_quads / (3600 / 36):.1f} times" in told
+    assert "min-pixels" in told
+    assert "smaller size" in told
+    asked = MeshOptions(size=6.0, material_sizes={"m0": 1.0})
+    assert thin_features(done.labels, done.mesh, asked) is None, "so many were asked for"
+    assert thin_features(done.labels, mesh_image(label_image(np.zeros((60, 60))), options), options) is None

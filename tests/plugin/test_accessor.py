@@ -96,3 +96,11 @@ def test_accessor_follows_its_dataset() -> None:
     other["label"] = np.zeros(image.n_points, int)
     assert len(np.unique(image.imgquad.mesh()["material"])) == 3
     assert len(np.unique(other.imgquad.mesh()["material"])) == 1
+
+
+def test_thin_features_are_a_warning_of_the_caller() -> None:
+    image = pv.ImageData(dimensions=(60, 60, 1))
+    image["label"] = (np.random.default_rng(1).random(3600) < 0.08).astype(int)
+    with pytest.warns(UserWarning, match="thin features force [0-9]+ quads") as caught:
+        image.imgquad.mesh("label", size=6.0, min_pixels=0, min_length=0)
+    assert caught[0].filename == __file__
