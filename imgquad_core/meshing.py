@@ -314,9 +314,11 @@ def _fitted(part: FaceQuads, targets: Points, whole: bool) -> FaceQuads:
     return part._replace(points=points, wanted=wanted)
 
 
-def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int) -> FaceQuads:
-    """Smooth the nodes inside faces."""
+def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int, only: Flags | None = None) -> FaceQuads:
+    """Smooth the nodes inside faces, all or some."""
     points, free = part.points.copy(), part.origin < 0
+    if only is not None:
+        free &= only
     rings = rings_of(part.quads, len(points))
     laplace(points, rings, free, laplace_sweeps)
     untangle(points, rings, free, 2, BAD)
@@ -326,8 +328,8 @@ def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int) -> FaceQu
 
 def _without_poor(part: FaceQuads) -> FaceQuads:
     """Replace the worst quads and smooth what is new."""
-    better = repair(part, POOR)
-    return part if better is part else _relaxed(better, 3, 6)
+    better, beside = repair(part, POOR)
+    return _relaxed(better, 3, 6, beside) if beside.any() else part
 
 
 def _faces_beside(graph: BoundaryGraph, chains: Flags) -> Flags:

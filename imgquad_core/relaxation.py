@@ -44,22 +44,19 @@ def rings_of(quads: Ids, n_points: int) -> Rings:
     return Rings(quads, offsets, corners)
 
 
-@verb
-def corner_sine(points: Points, quads: Ids, q: int, k: int) -> float:
-    """Sine of the angle at corner k of quad q (negative where it is reflex)."""
-    v, a, b = quads[q, k], quads[q, (k + 1) & 3], quads[q, (k + 3) & 3]
-    ax, ay = points[a, 0] - points[v, 0], points[a, 1] - points[v, 1]
-    bx, by = points[b, 0] - points[v, 0], points[b, 1] - points[v, 1]
-    return float((ax * by - ay * bx) / (np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by)) + 1e-300))
-
-
 @kernel
 def quad_quality(points: Points, quads: Ids, q: int) -> float:
-    """Scaled Jacobian of quad q: the least of its corner sines."""
-    return min(
-        min(corner_sine(points, quads, q, 0), corner_sine(points, quads, q, 1)),
-        min(corner_sine(points, quads, q, 2), corner_sine(points, quads, q, 3)),
-    )
+    """Scaled Jacobian of quad q: the least sine of its corners (negative where one is reflex)."""
+    worst = 1.0
+    p = quads[q, 3]
+    ax, ay = points[quads[q, 0], 0] - points[p, 0], points[quads[q, 0], 1] - points[p, 1]
+    for k in range(4):  # at corner p, edge a comes in and edge b goes out
+        p, n = quads[q, k], quads[q, (k + 1) & 3]
+        bx, by = points[n, 0] - points[p, 0], points[n, 1] - points[p, 1]
+        sine = (ax * by - ay * bx) / (np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by)) + 1e-300)
+        worst = min(worst, sine)
+        ax, ay = bx, by
+    return float(worst)
 
 
 @kernel
@@ -77,6 +74,31 @@ def ring_quality(points: Points, rings: Rings, v: int) -> float:
     for i in range(rings.offsets[v], rings.offsets[v + 1]):
         worst = min(worst, quad_quality(points, rings.quads, rings.corners[i] >> 2))
     return worst
+
+
+@verb
+def is_ring_above(points: Points, rings: Rings, v: int, floor: float) -> bool:
+    """Whether the quads around node v have a scaled Jacobian of `floor` or more; fast where `floor` is positive."""
+    if floor <= 0.0:
+        return ring_quality(points, rings, v) >= floor
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        q = rings.corners[i] >> 2
+        p = rings.quads[q, 3]
+        ax, ay = points[rings.quads[q, 0], 0] - points[p, 0], points[rings.quads[q, 0], 1] - points[p, 1]
+        for k in range(4):  # squares instead of roots
+            p, n = rings.quads[q, k], rings.quads[q, (k + 1) & 3]
+            bx, by = points[n, 0] - points[p, 0], points[n, 1] - points[p, 1]
+            turn = ax * by - ay * bx
+            if turn <= 0.0 or turn * turn < floor * floor * (ax * ax + ay * ay) * (bx * bx + by * by):
+                return False
+            ax, ay = bx, by
+    return True
+
+
+@verb
+def guarded(points: Points, rings: Rings, v: int) -> float:
+    """Return the scaled Jacobian that a move of node v must leave in its ring."""
+    return GUARD if is_ring_above(points, rings, v, GUARD) else ring_quality(points, rings, v)
 
 
 @verb
@@ -108,10 +130,9 @@ def laplace(points: Points, rings: Rings, free: Flags, sweeps: int) -> None:
             x, y = x / n, y / n
             if abs(x - old_x) + abs(y - old_y) < TOLERANCE * reach / n:
                 continue
-            before = ring_quality(points, rings, v)
+            need = guarded(points, rings, v)
             points[v, 0], points[v, 1] = x, y
-            after = ring_quality(points, rings, v)
-            if after < GUARD and after < before:
+            if not is_ring_above(points, rings, v, need):
                 points[v, 0], points[v, 1] = old_x, old_y
                 continue
             _activate_ring(active, rings, v)
@@ -201,9 +222,9 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             if not (active[v] and free[v]):
                 continue
             active[v] = False
-            before = ring_quality(points, rings, v)
-            if before >= good:
+            if is_ring_above(points, rings, v, good):
                 continue
+            need = guarded(points, rings, v)
             ring_energy(points, rings, v, now)
             if not np.isfinite(now[0]) or now[0] == 0.0:
                 continue
@@ -215,7 +236,7 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             for _ in range(HALVINGS):
                 points[v, 0], points[v, 1] = x + dx, y + dy
                 ring_energy(points, rings, v, then)
-                if then[0] < now[0] and ring_quality(points, rings, v) >= min(before, GUARD):
+                if then[0] < now[0] and is_ring_above(points, rings, v, need):
                     break  # the energy alone would pay for length with angles
                 points[v, 0], points[v, 1] = x, y
                 dx, dy = 0.5 * dx, 0.5 * dy
@@ -235,9 +256,9 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
         for v in range(len(points)):
             if not free[v] or rings.offsets[v] == rings.offsets[v + 1]:
                 continue
-            best = ring_quality(points, rings, v)
-            if best >= bad:
+            if is_ring_above(points, rings, v, bad):
                 continue
+            best = ring_quality(points, rings, v)
             step = 0.0
             for i in range(rings.offsets[v], rings.offsets[v + 1]):
                 c = rings.corners[i]

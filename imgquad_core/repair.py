@@ -50,19 +50,24 @@ ATTEMPTS = 3 * (COLLAPSE + 2)  # three fillings of each trial's outline
 CENTRE_STEPS = 8
 
 
-def repair(mesh: FaceQuads, below: float) -> FaceQuads:
-    """Replace quads whose scaled Jacobian is less than `below` where that makes the worst one better."""
+def repair(mesh: FaceQuads, below: float) -> tuple[FaceQuads, Flags]:
+    """Replace quads whose scaled Jacobian is less than `below` where that makes the worst one better.
+
+    Returns the mesh and its nodes at replaced quads or beside them.
+    """
     if len(mesh.quads) == 0:
-        return mesh
+        return mesh, np.zeros(0, np.bool_)
     net = net_of(mesh, LARGEST)
     cavity, canvas = scratch(net, LARGEST)
-    changed, hopeless = 0, np.zeros(len(net.quads), np.bool_)
+    hopeless, fresh = np.zeros((2, len(net.quads)), np.bool_)
     for _ in range(ROUNDS):
-        done = _repair_pass(net, cavity, canvas, below, hopeless)
-        changed += done
-        if done == 0:
+        if _repair_pass(net, cavity, canvas, below, hopeless, fresh) == 0:
             break
-    return compact(net, mesh) if changed else mesh
+    if not fresh.any():
+        return mesh, np.zeros(len(mesh.points), np.bool_)
+    beside = np.zeros(len(net.valence), np.bool_)
+    beside[net.quads[fresh & (net.quads[:, 0] >= 0)]] = True
+    return compact(net, mesh), beside[net.valence > 0]
 
 
 @verb
@@ -257,7 +262,7 @@ def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
 
 
 @kernel
-def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float, hopeless: Flags) -> int:
+def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float, hopeless: Flags, fresh: Flags) -> int:
     """Try to replace each quad worse than `below`; return how many cavities were filled anew.
 
     Quads are hopeless from a vain try on, until something changes beside them.
@@ -273,24 +278,32 @@ def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float, hopeles
         if net.quads[q, 0] < 0 or hopeless[q] or quad_quality(net.points, net.quads, q) >= below:
             continue
         hopeless[q] = True
-        chosen, chosen_attempt = LEAST_GAIN, -1
-        for turn in range(ATTEMPTS + 1):  # all attempts, then the best one again
-            attempt = turn if turn < ATTEMPTS else chosen_attempt
-            if attempt < 0 or not _grow(net, cavity, q, attempt // 3):
+        chosen, chosen_attempt, fits, worst, enough = LEAST_GAIN, -1, False, 1.0, False
+        for turn in range(ATTEMPTS + 1):  # all attempts until one leaves nothing poor, then the best one again
+            last = enough or turn == ATTEMPTS
+            attempt = chosen_attempt if last else turn
+            if last or turn % 3 == 0:
+                fits = attempt >= 0 and _grow(net, cavity, q, attempt // 3)
+                worst = _worst_member(net, cavity) if fits else 1.0
+            if not fits:
+                if last:
+                    break
                 continue
-            worst = _worst_member(net, cavity)
-            floor = worst + (chosen if turn < ATTEMPTS else LEAST_GAIN)
-            gain = min(_try(net, cavity, canvas, q, attempt, floor, best, first, second), below) - worst
-            if turn < ATTEMPTS:
-                if gain > chosen:
-                    chosen, chosen_attempt = gain, attempt
-            elif _rings_have_room(net, cavity, canvas):
+            quality = _try(
+                net, cavity, canvas, q, attempt, worst + (LEAST_GAIN if last else chosen), best, first, second
+            )
+            if not last:
+                if min(quality, below) - worst > chosen:
+                    chosen, chosen_attempt, enough = min(quality, below) - worst, attempt, quality >= below
+                continue
+            if _rings_have_room(net, cavity, canvas):
                 face = net.face[cavity.members[0]]
                 remove(net, cavity)
                 insert(net, canvas, new_id, face)
                 for i in range(cavity.count[OUTLINE]):
                     v = cavity.loop[i]
                     for j in range(net.valence[v]):
-                        hopeless[net.ring[v, j]] = False
+                        hopeless[net.ring[v, j]], fresh[net.ring[v, j]] = False, True
                 done += 1
+            break
     return done

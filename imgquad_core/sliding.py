@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .jit import kernel, verb
 from .model import PointKind
-from .relaxation import GUARD, HALVINGS, Rings, ring_energy, ring_quality
+from .relaxation import HALVINGS, Rings, guarded, is_ring_above, ring_energy
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -41,9 +41,9 @@ def slide(points: Points, rings: Rings, kind: NDArray[np.uint8], offsets: Ids, i
 @verb
 def _slide_node(points: Points, rings: Rings, v: int, p: int, n: int, gone: Points, energy: Points) -> None:
     """Move node v parallel to the line from p to n by one guarded Newton step."""
-    quality = ring_quality(points, rings, v)
-    if quality > GOOD_ENOUGH:
+    if is_ring_above(points, rings, v, GOOD_ENOUGH):
         return
+    need = guarded(points, rings, v)
     x, y = points[v, 0], points[v, 1]
     tx, ty = 0.5 * (points[n, 0] - points[p, 0]), 0.5 * (points[n, 1] - points[p, 1])
     ring_energy(points, rings, v, energy)
@@ -56,7 +56,7 @@ def _slide_node(points: Points, rings: Rings, v: int, p: int, n: int, gone: Poin
     for _ in range(HALVINGS):
         points[v, 0], points[v, 1] = x + step * tx, y + step * ty
         ring_energy(points, rings, v, energy)
-        if energy[0] < least and ring_quality(points, rings, v) >= min(quality, GUARD):
+        if energy[0] < least and is_ring_above(points, rings, v, need):
             gone[v] += step
             return
         step *= 0.5
