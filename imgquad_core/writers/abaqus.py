@@ -79,7 +79,7 @@ def write_abaqus(
         Also write an element set for each connected region.
     interfaces : str, optional
         Cohesive elements as ``elements`` (COH2D4, COH3D8) or as ``springs`` (SPRING2: CalculiX has no cohesive
-        elements; the default in a deck).
+        elements; the default in a deck). Second-order quads have springs only.
 
     Raises
     ------
@@ -95,6 +95,8 @@ def write_abaqus(
         )
     if not thickness > 0:
         raise InputError(f"thickness = {thickness!r} must be positive")
+    if interfaces is not None and not len(mesh.cohesive):
+        raise InputError(f"interfaces = '{interfaces}', but no interface was split: say which, with cohesive")
     values = read_properties(properties) if properties is not None else {}
     if deck is not None and deck not in DECKS:
         raise InputError(f"there is no deck '{deck}'; choose one of: {', '.join(DECKS)}")

@@ -108,7 +108,17 @@ def refuse_cohesive(mesh: FEMesh, form: str) -> None:
     """Raise where `form` cannot hold cohesive elements."""
     if len(mesh.cohesive):
         raise InputError(
-            f"{form} has no cohesive elements; write .inp, .e, .msh or .npz, or leave the interfaces whole"
+            f"{form} has no cohesive elements; write .inp, .e, .msh, .vtu or .npz, or no elements between the sides "
+            "(interfaces: sides)"
+        )
+
+
+def refuse_six_nodes(mesh: FEMesh, form: str, remedy: str = "") -> None:
+    """Raise where `form` cannot hold the cohesive elements of second-order quads."""
+    if len(mesh.cohesive) and mesh.cohesive.shape[1] == 6:
+        raise InputError(
+            f"{form} has no six-node cohesive elements, as order 2 makes them ({len(mesh.cohesive)} here); write .vtu "
+            f"or .npz, take order 1, {remedy}or no elements between the sides (interfaces: sides)"
         )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh, Floats, Ints
-from imgquad_core.writers.common import points_3d, rows, safe_names, write_text
+from imgquad_core.writers.common import points_3d, refuse_six_nodes, rows, safe_names, write_text
 
 NAME_LIMIT = 127
 ELEMENT_TYPES = {"point": 15, "line2": 1, "line3": 8, "quad4": 3, "quad8": 16, "quad9": 10, "hex8": 5}
@@ -46,10 +46,11 @@ def write_gmsh(mesh: FEMesh, path: str | Path, *, version: str = "4.1") -> None:
     Raises
     ------
     InputError
-        Another version, or a name of more than 127 signs.
+        Another version, six-node cohesive elements, or a name of more than 127 signs.
     """
     if version not in ("4.1", "2.2"):
         raise InputError(f"Gmsh version '{version}' is not written; choose 4.1 or 2.2")
+    refuse_six_nodes(mesh, "Gmsh")
     groups = _groups(mesh)
     points = points_3d(mesh)
     write_text(path, _text_41(points, groups) if version == "4.1" else _text_22(points, groups))
@@ -68,8 +69,6 @@ def _groups(mesh: FEMesh) -> list[Group]:
 def _cell_groups(mesh: FEMesh) -> Iterator[tuple[int, str, str, Ints]]:
     for name, ids in mesh.material_cells().items():
         yield mesh.dimension, name, mesh.kind, mesh.cells[ids]
-    if mesh.cohesive.shape[1] == 6:
-        raise InputError("Gmsh has no six-node cohesive elements: split interfaces at order 1, or write .npz")
     for name, ids in mesh.cohesive_cells().items():
         yield mesh.dimension, name, "hex8" if mesh.dimension == 3 else "quad4", mesh.cohesive[ids]
 
