@@ -76,8 +76,8 @@ def open_interfaces(mesh: FEMesh) -> FEMesh:
 
     So any format and any order can hold it; for contact, and for solvers that put cohesive laws between sides.
     """
-    none = np.empty((0, 4), np.int64)
-    return replace(mesh, cohesive=none, cohesive_pair=none[:, :2])
+
+    return replace(mesh, cohesive=np.empty((0, 4), np.int64), cohesive_pair=np.empty((0, 2), np.int32))
 
 
 def _chosen(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]]) -> list[tuple[int, int]]:
