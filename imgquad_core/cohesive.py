@@ -76,7 +76,6 @@ def open_interfaces(mesh: FEMesh) -> FEMesh:
 
     So any format and any order can hold it; for contact, and for solvers that put cohesive laws between sides.
     """
-
     return replace(mesh, cohesive=np.empty((0, 4), np.int64), cohesive_pair=np.empty((0, 2), np.int32))
 
 

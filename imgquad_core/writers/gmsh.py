@@ -51,9 +51,13 @@ def write_gmsh(mesh: FEMesh, path: str | Path, *, version: str = "4.1") -> None:
     if version not in ("4.1", "2.2"):
         raise InputError(f"Gmsh version '{version}' is not written; choose 4.1 or 2.2")
     refuse_six_nodes(mesh, "Gmsh")
-    groups = _groups(mesh)
-    points = points_3d(mesh)
-    write_text(path, _text_41(points, groups) if version == "4.1" else _text_22(points, groups))
+    write_text(path, gmsh_text(mesh, version))
+
+
+def gmsh_text(mesh: FEMesh, version: str = "4.1") -> Iterator[str]:
+    """Text of a Gmsh mesh, in parts."""
+    groups, points = _groups(mesh), points_3d(mesh)
+    return _text_41(points, groups) if version == "4.1" else _text_22(points, groups)
 
 
 def _groups(mesh: FEMesh) -> list[Group]:

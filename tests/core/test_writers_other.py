@@ -136,8 +136,10 @@ def test_the_archive_holds_everything(tmp_path: Path) -> None:
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
-@pytest.mark.parametrize("extension", sorted(set(WRITERS) - {".med", ".xdmf"}))
+@pytest.mark.parametrize("extension", sorted(WRITERS))
 def test_a_disk_that_fills_up_leaves_the_old_file_and_no_half_one(tmp_path: Path, extension: str) -> None:
+    for package in {".med": ["gmsh"], ".xdmf": ["meshio", "h5py"]}.get(extension, []):
+        pytest.importorskip(package)
     target = tmp_path / f"a{extension}"
     target.write_text("old")
     program = (
@@ -157,7 +159,8 @@ def test_a_disk_that_fills_up_leaves_the_old_file_and_no_half_one(tmp_path: Path
         text=True,
         env={"PYTHONPATH": ":".join(sys.path)},
     )
-    assert "cannot write" in run.stdout, run.stderr
+    assert f"cannot write {target}: " in run.stdout, run.stderr
+    assert (run.returncode, run.stderr) == (0, "")
     assert "nothing was changed" in run.stdout
     assert [p.name for p in tmp_path.iterdir()] == [target.name]
     assert target.read_text() == "old"
