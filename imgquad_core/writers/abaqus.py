@@ -123,14 +123,16 @@ def element_type(mesh: FEMesh, analysis: str, reduced: bool) -> str:
     Raises
     ------
     InputError
-        There is no such analysis or no such element.
+        There is no such analysis, no such element, or none of reduced integration.
     """
     if analysis not in ELEMENTS:
         raise InputError(f"there is no analysis '{analysis}'; choose one of: {', '.join(ELEMENTS)}")
     if mesh.kind not in ELEMENTS[analysis]:
         kinds = ", ".join(ELEMENTS[analysis])
         raise InputError(f"Abaqus has no {mesh.kind} for the analysis '{analysis}'; it has: {kinds}")
-    return ELEMENTS[analysis][mesh.kind] + ("R" if reduced and "heat" not in analysis else "")
+    if reduced and "heat" in analysis:
+        raise InputError(f"the analysis '{analysis}' has no elements of reduced integration: leave out reduced")
+    return ELEMENTS[analysis][mesh.kind] + ("R" if reduced else "")
 
 
 def _head(mesh: FEMesh, element: str) -> Iterator[str]:

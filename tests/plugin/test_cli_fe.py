@@ -92,6 +92,7 @@ def test_grids_take_all_elements(picture: Path) -> None:
         ("a.bdf", ["--cohesive", "all"], "Nastran has no cohesive elements; write .inp"),
         ("a.e", ["--interfaces", "sides"], "say which, with cohesive"),
         ("a.inp", ["--interfaces", "springs"], "no interface was split"),
+        ("a.inp", ["--analysis", "heat", "--reduced"], "no elements of reduced integration"),
         ("a.msh", ["--interfaces", "springs", "--cohesive", "all"], ".msh files have no --interfaces springs"),
     ],
 )

@@ -34,7 +34,7 @@ def add_element_options(parser: argparse.ArgumentParser) -> None:
     add("--regions", action="store_true", default=None, help="an element set for each connected region, too: .inp")
     add(
         "--interfaces",
-        metavar="elements|springs|sides",
+        choices=("elements", "springs", "sides"),
         help="between split sides: cohesive elements, springs (.inp), or nothing, just the sides as sets",
     )
     add("--msh-version", dest="version_", metavar="V", help="4.1 (default) or 2.2: .msh")
