@@ -14,6 +14,7 @@ from imgquad_core.writers.common import points_3d, refuse_cohesive, refuse_six_n
 from imgquad_core.writers.gmsh import gmsh_text
 
 OVERHEAD = 200_000  #: bytes of an HDF5 file besides the arrays, at most
+MED_NAME_LIMIT = 80  #: Gmsh cuts longer ones off
 MESHIO_KINDS = {"quad4": "quad", "quad8": "quad8", "quad9": "quad9", "hex8": "hexahedron"}
 
 
@@ -23,14 +24,14 @@ def write_med(mesh: FEMesh, path: str | Path) -> None:
     Raises
     ------
     InputError
-        The Python package gmsh is not installed.
+        The Python package gmsh is not installed, six-node cohesive elements, or a name of more than 80 signs.
     """
     gmsh = _needed("gmsh", ".med")
     refuse_six_nodes(mesh, "Gmsh, which writes .med,")
     with replacing(path) as temporary:
         source = temporary.with_suffix(".msh")
         with source.open("w", encoding="utf-8", newline="\n") as stream:
-            stream.writelines(gmsh_text(mesh))
+            stream.writelines(gmsh_text(mesh, name_limit=MED_NAME_LIMIT))
         take_room(temporary.parent, 2 * (points_3d(mesh).nbytes + mesh.cells.nbytes) + OVERHEAD)
         gmsh.initialize(interruptible=False)
         try:

@@ -54,15 +54,15 @@ def write_gmsh(mesh: FEMesh, path: str | Path, *, version: str = "4.1") -> None:
     write_text(path, gmsh_text(mesh, version))
 
 
-def gmsh_text(mesh: FEMesh, version: str = "4.1") -> Iterator[str]:
-    """Text of a Gmsh mesh, in parts."""
-    groups, points = _groups(mesh), points_3d(mesh)
+def gmsh_text(mesh: FEMesh, version: str = "4.1", name_limit: int = NAME_LIMIT) -> Iterator[str]:
+    """Text of a Gmsh mesh, in parts; names of groups have at most `name_limit` signs."""
+    groups, points = _groups(mesh, name_limit), points_3d(mesh)
     return _text_41(points, groups) if version == "4.1" else _text_22(points, groups)
 
 
-def _groups(mesh: FEMesh) -> list[Group]:
+def _groups(mesh: FEMesh, name_limit: int) -> list[Group]:
     found = [*_cell_groups(mesh), *_side_groups(mesh), *_point_groups(mesh)]
-    names = safe_names([name for _, name, _, _ in found], NAME_LIMIT)
+    names = safe_names([name for _, name, _, _ in found], name_limit)
     groups, first = [], 1
     for tag, (dimension, name, element, nodes) in enumerate(found, 1):
         groups.append(Group(dimension, tag, names[name], ELEMENT_TYPES[element], nodes, first))

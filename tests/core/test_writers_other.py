@@ -166,6 +166,28 @@ def test_a_disk_that_fills_up_leaves_the_old_file_and_no_half_one(tmp_path: Path
     assert target.read_text() == "old"
 
 
+@pytest.mark.parametrize(
+    ("extension", "limit"), [(".inp", 80), (".bdf", 60), (".msh", 127), (".med", 80), (".e", 255), (".obj", 255)]
+)
+def test_names_as_long_as_the_format_takes_are_whole_and_longer_ones_are_refused(
+    tmp_path: Path, extension: str, limit: int
+) -> None:
+    if extension == ".med":
+        pytest.importorskip("gmsh")
+    longest_name = {".inp": "S_INTERFACE_{}_B", ".obj": "{}"}.get(extension, "interface_{}_b")
+    longest = limit - len(longest_name.format(""))
+    for letters in (longest, longest + 1):
+        mesh = staircase([[0, 1], [0, 1]], ("a" * letters, "b"))
+        path = tmp_path / f"{letters}{extension}"
+        if letters == longest:
+            write_mesh(mesh, path)
+            assert longest_name.format("a" * letters).lower().encode() in path.read_bytes().lower()
+        else:
+            with pytest.raises(InputError, match=f"has {limit + 1} signs, this format takes {limit}"):
+                write_mesh(mesh, path)
+            assert not path.exists()
+
+
 def test_unknown_formats_and_places_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no writer for '.foo'.*\.inp"):
         writer_for("a.foo")
