@@ -230,7 +230,7 @@ def _extend(
 def fit_pieces(
     points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed: NDArray[np.bool_], windows: Floats
 ) -> Floats:
-    """Smooth pieces of chains by local quadratics.
+    """Smooth pieces of chains by local quadratics and, where windows are wide, quartics.
 
     Parameters
     ----------
