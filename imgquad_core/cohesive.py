@@ -71,6 +71,14 @@ def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all
     return replace(split, node_sets=_node_sets(split, origin))
 
 
+def open_interfaces(mesh: FEMesh) -> FEMesh:
+    """Return a split `mesh` without its cohesive elements: both sides of an interface stay, as sets, apart.
+
+    So any format and any order can hold it; for contact, and for solvers that put cohesive laws between sides.
+    """
+    return replace(mesh, cohesive=np.empty((0, 4), np.int64), cohesive_pair=np.empty((0, 2), np.int32))
+
+
 def _chosen(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]]) -> list[tuple[int, int]]:
     """Numbers of the materials of each pair, lower first; none for all pairs."""
     if pairs == "all":

@@ -4,6 +4,11 @@ The paper fits ``f(x) = a + b x + c x^2`` to the samples, which fails where a bo
 quadratics of the length u along the pixel boundary, fitted around every point with a bell-shaped weight; the point
 moves to the value at u = 0. The window is the widest one whose residual across the curve is still the noise of
 pixel stairs, so straight and gently bent boundaries are averaged over long stretches and details stay.
+
+Over a wide window a quadratic is off for two reasons: the length along pixels runs up to 8 % faster in some directions
+than in others, and a bend is no parabola. So where windows are wide, quartics of the length along the quadratics'
+curve take over, in a window half as wide again, which averages as much. A circle of radius 40 comes out with 0.06 px
+(rms) of noise instead of 0.08, and that in longer waves: half the slope.
 """
 
 from __future__ import annotations
@@ -11,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.curves import Floats, Ints
+from imgquad_core.curves import Floats, Ints, arc_lengths
 from imgquad_core.jit import kernel, verb
 
 WINDOWS = (3.0, 4.5, 6.5, 9.5, 14.0, 20.0, 30.0, 45.0, 65.0)  #: half widths that are tried, px of arc
@@ -20,6 +25,9 @@ _EVERY = 4  # windows are chosen at every 4th point
 _DARING = 20.0  # wider ones only if the last two did
 _SLOPE = 0.5  # and change by this much a px of arc
 _SINGULAR = 1e-9  # least determinant of moments over the product of their diagonal: two samples fix no quadratic
+_WIDER = 1.5  # window of the quartic over that of the quadratic: the same noise
+_DETAIL, _WIDE = 6.5, 14.0  # px; windows below the one keep quadratics, above the other they get quartics
+_LEAST_PIVOT = 1e-9  # over the sum of weights
 _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are: regression would let them collapse
 
 
@@ -96,6 +104,42 @@ def quadratic_at(
 
 
 @verb
+def _quartic_at(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, a: Floats) -> tuple[float, float]:
+    """Fit a quartic around point i: its shift in x and in y.
+
+    Row r of the normal equations `a` is that of (u / w)^(4 - r), the right-hand sides of x and y are its last columns:
+    what is left of the last row when the others are eliminated is the value at u = 0.
+    """
+    for r in range(5):
+        for c in range(7):
+            a[r, c] = 0.0
+    for step in (-1, 1):
+        j = i if step == 1 else i - 1
+        while 0 <= j < len(s) and abs(s[j] - s[i]) <= w:
+            t = (s[j] - s[i]) / w
+            g = 1.0 - 0.47 * t * t
+            g *= g * q[j]
+            for r in range(4, -1, -1):
+                a[r, 5] += g * (x[j] - x[i])
+                a[r, 6] += g * (y[j] - y[i])
+                power = g
+                for c in range(4, r - 1, -1):
+                    a[r, c] += power
+                    power *= t
+                g *= t
+            j += step
+    least = _LEAST_PIVOT * a[4, 4]
+    for k in range(4):
+        pivot = max(a[k, k], least)  # a power that the samples do not determine gets no share
+        for r in range(k + 1, 5):
+            share = a[k, r] / pivot
+            for c in range(r, 7):
+                a[r, c] -= share * a[k, c]
+    value = max(a[4, 4], least)
+    return a[4, 5] / value, a[4, 6] / value
+
+
+@verb
 def _choose_windows(
     x: Floats, y: Floats, s: Floats, q: Floats, first: int, last: int, widest: float, windows: Floats, w: Floats
 ) -> None:
@@ -122,6 +166,35 @@ def _choose_windows(
         w[i] = min(w[i], w[i - 1] + _SLOPE * (s[i] - s[i - 1]))
     for i in range(last - 1, first - 1, -1):
         w[i] = min(w[i], w[i + 1] + _SLOPE * (s[i + 1] - s[i]))
+
+
+@verb
+def _put_quadratics(
+    x: Floats, y: Floats, s: Floats, q: Floats, at: int, width: Floats, closed: bool, piece: Floats, sums: Floats
+) -> None:
+    """Move the points of a piece, of which the first stands at `at`, to the values of their quadratics."""
+    n = len(piece) - 1
+    for j in range(0 if closed else 1, n):
+        dx, dy, _ = quadratic_at(x, y, s, q, at + j, width[j], sums)
+        piece[j, 0], piece[j, 1] = x[at + j] + dx, y[at + j] + dy
+    if closed:
+        piece[n, 0], piece[n, 1] = piece[0, 0], piece[0, 1]
+
+
+@verb
+def _put_quartics(
+    x: Floats, y: Floats, s: Floats, q: Floats, at: int, width: Floats, closed: bool, piece: Floats, matrix: Floats
+) -> None:
+    """Move the points of a piece on to the values of quartics, where windows are wide."""
+    n = len(piece) - 1
+    for j in range(0 if closed else 1, n):
+        share = min((width[j] - _DETAIL) / (_WIDE - _DETAIL), 1.0)
+        if share > 0.0:
+            dx, dy = _quartic_at(x, y, s, q, at + j, _WIDER * width[j], matrix)
+            piece[j, 0] += share * (x[at + j] + dx - piece[j, 0])
+            piece[j, 1] += share * (y[at + j] + dy - piece[j, 1])
+    if closed:
+        piece[n, 0], piece[n, 1] = piece[0, 0], piece[0, 1]
 
 
 @verb
@@ -162,7 +235,7 @@ def _extend(
 def fit_pieces(
     points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed: NDArray[np.bool_], windows: Floats
 ) -> Floats:
-    """Smooth pieces of chains by local quadratics.
+    """Smooth pieces of chains by local quadratics and, where windows are wide, quartics.
 
     Parameters
     ----------
@@ -190,7 +263,9 @@ def fit_pieces(
         longest = max(longest, pieces[k, 1] - pieces[k, 0])
     out = np.empty((4, 3 * longest + 4))
     w = np.empty(3 * longest + 4)
-    sums = np.empty(14)
+    width = np.empty(longest + 1)
+    true_arc = np.empty(len(points))
+    sums, matrix = np.empty(14), np.empty((5, 7))
     for k in range(len(pieces)):
         first, last = pieces[k, 0], pieces[k, 1]
         n = last - first
@@ -201,10 +276,11 @@ def fit_pieces(
         at = _extend(points, arc, weight, first, last, closed[k], widest, out)
         x, y, s, q = out[0], out[1], out[2], out[3]
         _choose_windows(x, y, s, q, at, at + n, widest, windows, w)
-        for j in range(0 if closed[k] else 1, n):
-            dx, dy, _ = quadratic_at(x, y, s, q, at + j, w[at + j], sums)
-            fitted[first + j, 0] += dx
-            fitted[first + j, 1] += dy
-        if closed[k]:
-            fitted[last, 0], fitted[last, 1] = fitted[first, 0], fitted[first, 1]
+        width[: n + 1] = w[at : at + n + 1]
+        piece = fitted[first : last + 1]
+        _put_quadratics(x, y, s, q, at, width, closed[k], piece, sums)
+        if width[: n + 1].max() > _DETAIL:
+            true_arc[first : last + 1] = arc_lengths(piece, np.array([0, n + 1]))
+            at = _extend(points, true_arc, weight, first, last, closed[k], _WIDER * widest, out)
+            _put_quartics(x, y, s, q, at, width, closed[k], piece, matrix)
     return fitted

@@ -63,10 +63,10 @@ def jiggle_beside(axis: int, *places: float) -> Callable[[Floats], Floats]:
     return move
 
 
-def disk(n: int, radius: float) -> NDArray[np.int32]:
-    """An n x n picture: 1 inside the circle about its centre, 0 outside."""
+def disk(n: int, radius: float, off: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.int32]:
+    """An n x n picture: 1 inside the circle about its centre (moved by `off`, y up), 0 outside."""
     at = np.arange(n) + 0.5 - n / 2
-    return (at[:, None] ** 2 + at[None, :] ** 2 < radius**2).astype(np.int32)
+    return ((at[None, :] - off[0]) ** 2 + (at[::-1, None] - off[1]) ** 2 < radius**2).astype(np.int32)
 
 
 def round_inclusion(n: int, radius: float, side: float, layers: int) -> QuadMesh:

@@ -79,7 +79,7 @@ def write_abaqus(
         Also write an element set for each connected region.
     interfaces : str, optional
         Cohesive elements as ``elements`` (COH2D4, COH3D8) or as ``springs`` (SPRING2: CalculiX has no cohesive
-        elements; the default in a deck).
+        elements; the default in a deck). Second-order quads have springs only.
 
     Raises
     ------
@@ -95,6 +95,8 @@ def write_abaqus(
         )
     if not thickness > 0:
         raise InputError(f"thickness = {thickness!r} must be positive")
+    if interfaces is not None and not len(mesh.cohesive):
+        raise InputError(f"interfaces = '{interfaces}', but no interface was split: say which, with cohesive")
     values = read_properties(properties) if properties is not None else {}
     if deck is not None and deck not in DECKS:
         raise InputError(f"there is no deck '{deck}'; choose one of: {', '.join(DECKS)}")
@@ -121,14 +123,16 @@ def element_type(mesh: FEMesh, analysis: str, reduced: bool) -> str:
     Raises
     ------
     InputError
-        There is no such analysis or no such element.
+        There is no such analysis, no such element, or none of reduced integration.
     """
     if analysis not in ELEMENTS:
         raise InputError(f"there is no analysis '{analysis}'; choose one of: {', '.join(ELEMENTS)}")
     if mesh.kind not in ELEMENTS[analysis]:
         kinds = ", ".join(ELEMENTS[analysis])
         raise InputError(f"Abaqus has no {mesh.kind} for the analysis '{analysis}'; it has: {kinds}")
-    return ELEMENTS[analysis][mesh.kind] + ("R" if reduced and "heat" not in analysis else "")
+    if reduced and "heat" in analysis:
+        raise InputError(f"the analysis '{analysis}' has no elements of reduced integration: leave out reduced")
+    return ELEMENTS[analysis][mesh.kind] + ("R" if reduced else "")
 
 
 def _head(mesh: FEMesh, element: str) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -36,5 +37,7 @@ def write_npz(mesh: FEMesh, path: str | Path) -> None:
         ("periodic", mesh.periodic),
     ):
         arrays |= {f"{group}/{name.replace('/', '_')}": ids for name, ids in sets.items()}
-    with replacing(path) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)
+    whole = BytesIO()  # NumPy's archive is noisy where a disk fills up
+    np.savez_compressed(whole, **arrays)
+    with replacing(path) as temporary:
+        temporary.write_bytes(whole.getbuffer())

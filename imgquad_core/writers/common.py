@@ -19,6 +19,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh, Names
 
 ROWS_AT_ONCE = 20_000
+BYTES_AT_ONCE = 1 << 20
 
 
 @contextmanager
@@ -39,6 +40,16 @@ def replacing(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"cannot write {target}: {reason}; nothing was changed, choose another place") from error
+
+
+def take_room(folder: Path, n_bytes: int) -> None:
+    """Raise `OSError` if there is no room for `n_bytes` in `folder`, by writing as many.
+
+    For libraries that crash or keep silent where a disk fills up, as those that write HDF5 do.
+    """
+    with tempfile.TemporaryFile(dir=folder) as stream:
+        for start in range(0, n_bytes, BYTES_AT_ONCE):
+            stream.write(bytes(min(BYTES_AT_ONCE, n_bytes - start)))
 
 
 def write_text(path: str | Path, parts: Iterable[str]) -> None:
@@ -108,7 +119,17 @@ def refuse_cohesive(mesh: FEMesh, form: str) -> None:
     """Raise where `form` cannot hold cohesive elements."""
     if len(mesh.cohesive):
         raise InputError(
-            f"{form} has no cohesive elements; write .inp, .e, .msh or .npz, or leave the interfaces whole"
+            f"{form} has no cohesive elements; write .inp, .e, .msh, .vtu or .npz, or no elements between the sides "
+            "(interfaces: sides)"
+        )
+
+
+def refuse_six_nodes(mesh: FEMesh, form: str, remedy: str = "") -> None:
+    """Raise where `form` cannot hold the cohesive elements of second-order quads."""
+    if len(mesh.cohesive) and mesh.cohesive.shape[1] == 6:
+        raise InputError(
+            f"{form} has no six-node cohesive elements, as order 2 makes them ({len(mesh.cohesive)} here); write .vtu "
+            f"or .npz, take order 1, {remedy}or no elements between the sides (interfaces: sides)"
         )
 
 

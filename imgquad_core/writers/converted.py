@@ -10,9 +10,11 @@ import numpy as np
 
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh
-from imgquad_core.writers.common import points_3d, refuse_cohesive, replacing
-from imgquad_core.writers.gmsh import write_gmsh
+from imgquad_core.writers.common import points_3d, refuse_cohesive, refuse_six_nodes, replacing, take_room
+from imgquad_core.writers.gmsh import gmsh_text
 
+OVERHEAD = 200_000  #: bytes of an HDF5 file besides the arrays, at most
+MED_NAME_LIMIT = 80  #: Gmsh cuts longer ones off
 MESHIO_KINDS = {"quad4": "quad", "quad8": "quad8", "quad9": "quad9", "hex8": "hexahedron"}
 
 
@@ -22,12 +24,15 @@ def write_med(mesh: FEMesh, path: str | Path) -> None:
     Raises
     ------
     InputError
-        The Python package gmsh is not installed.
+        The Python package gmsh is not installed, six-node cohesive elements, or a name of more than 80 signs.
     """
     gmsh = _needed("gmsh", ".med")
+    refuse_six_nodes(mesh, "Gmsh, which writes .med,")
     with replacing(path) as temporary:
         source = temporary.with_suffix(".msh")
-        write_gmsh(mesh, source)
+        with source.open("w", encoding="utf-8", newline="\n") as stream:
+            stream.writelines(gmsh_text(mesh, name_limit=MED_NAME_LIMIT))
+        take_room(temporary.parent, 2 * (points_3d(mesh).nbytes + mesh.cells.nbytes) + OVERHEAD)
         gmsh.initialize(interruptible=False)
         try:
             gmsh.option.setNumber("General.Terminal", 0)
@@ -53,10 +58,12 @@ def write_xdmf(mesh: FEMesh, path: str | Path) -> None:
     _needed("h5py", ".xdmf")
     refuse_cohesive(mesh, "XDMF")
     points = points_3d(mesh) if mesh.dimension == 3 else mesh.points
+    sides, numbers = _tagged_sides(mesh)
+    arrays = (points, points, mesh.cells, mesh.cell_material, sides, numbers)
     with replacing(path) as temporary:
+        take_room(temporary.parent, sum(array.nbytes for array in arrays) + OVERHEAD)
         cells = [(MESHIO_KINDS[mesh.kind], mesh.cells)]
         meshio.write(temporary, meshio.Mesh(points, cells, cell_data={"material": [mesh.cell_material]}), "xdmf")
-        sides, numbers = _tagged_sides(mesh)
         kind = {(2, 2): "line", (2, 3): "line3", (3, 4): "quad"}[mesh.dimension, sides.shape[1]]
         tagged = meshio.Mesh(points, [(kind, sides)], cell_data={"side_set": [numbers]})
         meshio.write(temporary.with_name(f"{temporary.stem}_sides{temporary.suffix}"), tagged, "xdmf")

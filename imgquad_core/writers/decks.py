@@ -44,7 +44,7 @@ def deck_text(
         if missing:
             raise InputError(
                 f"the deck '{deck}' needs {' and '.join(missing)} of material '{name}'; "
-                f'give them in a TOML file of properties below [{name}] or ["*"]'
+                f'give them in a TOML file of properties below ["{name}"] or ["*"]'
             )
     if mesh.periodic:
         return periodic_deck(mesh, deck, nodes)

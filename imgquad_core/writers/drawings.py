@@ -41,7 +41,7 @@ def _layers(mesh: FEMesh, form: str) -> dict[str, list[Ints]]:
     refuse_3d(mesh, form)
     if not len(mesh.chain_points):
         raise InputError(
-            f"{form} draws the boundaries of a mesh whose interfaces were not split into cohesive elements"
+            f"{form} draws the boundaries of a mesh whose interfaces were not split: leave out the cohesive elements"
         )
     edges = {name: np.sort(mesh.side_nodes(sides)[:, :2], axis=1) for name, sides in mesh.side_sets.items()}
     owner: dict[tuple[int, int], str] = {}

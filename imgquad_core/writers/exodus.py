@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
-from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh, Ints
-from imgquad_core.writers.common import replacing, safe_names
+from imgquad_core.writers.common import refuse_six_nodes, replacing, safe_names
 
 NAME_LIMIT = 255
 ELEMENTS = {"quad4": "QUAD4", "quad8": "QUAD8", "quad9": "QUAD9", "hex8": "HEX8"}
@@ -36,8 +35,7 @@ def write_exodus(mesh: FEMesh, path: str | Path) -> None:
     InputError
         Six-node cohesive elements, or a name of more than 255 signs.
     """
-    if mesh.cohesive.shape[1] == 6:
-        raise InputError("Exodus has no six-node cohesive elements: split interfaces at order 1, or write .npz")
+    refuse_six_nodes(mesh, "Exodus")
     with replacing(path) as temporary, netcdf_file(str(temporary), "w", version=2) as file:
         _heading(file, mesh)
         position = _blocks(file, mesh)

@@ -13,7 +13,7 @@ import numpy as np
 
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh, Floats, Ints
-from imgquad_core.writers.common import points_3d, rows, safe_names, write_text
+from imgquad_core.writers.common import points_3d, refuse_six_nodes, rows, safe_names, write_text
 
 NAME_LIMIT = 127
 ELEMENT_TYPES = {"point": 15, "line2": 1, "line3": 8, "quad4": 3, "quad8": 16, "quad9": 10, "hex8": 5}
@@ -46,18 +46,23 @@ def write_gmsh(mesh: FEMesh, path: str | Path, *, version: str = "4.1") -> None:
     Raises
     ------
     InputError
-        Another version, or a name of more than 127 signs.
+        Another version, six-node cohesive elements, or a name of more than 127 signs.
     """
     if version not in ("4.1", "2.2"):
         raise InputError(f"Gmsh version '{version}' is not written; choose 4.1 or 2.2")
-    groups = _groups(mesh)
-    points = points_3d(mesh)
-    write_text(path, _text_41(points, groups) if version == "4.1" else _text_22(points, groups))
+    refuse_six_nodes(mesh, "Gmsh")
+    write_text(path, gmsh_text(mesh, version))
 
 
-def _groups(mesh: FEMesh) -> list[Group]:
+def gmsh_text(mesh: FEMesh, version: str = "4.1", name_limit: int = NAME_LIMIT) -> Iterator[str]:
+    """Text of a Gmsh mesh, in parts; names of groups have at most `name_limit` signs."""
+    groups, points = _groups(mesh, name_limit), points_3d(mesh)
+    return _text_41(points, groups) if version == "4.1" else _text_22(points, groups)
+
+
+def _groups(mesh: FEMesh, name_limit: int) -> list[Group]:
     found = [*_cell_groups(mesh), *_side_groups(mesh), *_point_groups(mesh)]
-    names = safe_names([name for _, name, _, _ in found], NAME_LIMIT)
+    names = safe_names([name for _, name, _, _ in found], name_limit)
     groups, first = [], 1
     for tag, (dimension, name, element, nodes) in enumerate(found, 1):
         groups.append(Group(dimension, tag, names[name], ELEMENT_TYPES[element], nodes, first))
@@ -68,8 +73,6 @@ def _groups(mesh: FEMesh) -> list[Group]:
 def _cell_groups(mesh: FEMesh) -> Iterator[tuple[int, str, str, Ints]]:
     for name, ids in mesh.material_cells().items():
         yield mesh.dimension, name, mesh.kind, mesh.cells[ids]
-    if mesh.cohesive.shape[1] == 6:
-        raise InputError("Gmsh has no six-node cohesive elements: split interfaces at order 1, or write .npz")
     for name, ids in mesh.cohesive_cells().items():
         yield mesh.dimension, name, "hex8" if mesh.dimension == 3 else "quad4", mesh.cohesive[ids]
 

@@ -10,7 +10,7 @@ import numpy as np
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh, Floats, Ints
 from imgquad_core.properties import Properties, interface_values
-from imgquad_core.writers.common import real, rows
+from imgquad_core.writers.common import real, refuse_six_nodes, rows
 
 ELEMENTS = {4: "COH2D4", 8: "COH3D8"}
 INTERFACES = ("elements", "springs")
@@ -52,6 +52,7 @@ def interface_text(
         a, b = (names[int(m)] for m in mesh.cohesive_pair[ids[0]])
         stiffness = interface_values(values, a, b)
         if interfaces == "elements":
+            refuse_six_nodes(mesh, "Abaqus", "write springs (interfaces: springs) ")
             yield from _elements(mesh, ids, labels[name], stiffness, thickness)
         else:
             missing = [key for key in STIFFNESS if key not in stiffness]
@@ -65,8 +66,6 @@ def interface_text(
 
 def _elements(mesh: FEMesh, ids: Ints, label: str, stiffness: Mapping[str, float], thickness: float) -> Iterator[str]:
     n_nodes = mesh.cohesive.shape[1]
-    if n_nodes not in ELEMENTS:
-        raise InputError("Abaqus has no six-node cohesive element: split at order 1, or write interfaces as springs")
     yield f"*ELEMENT, TYPE={ELEMENTS[n_nodes]}, ELSET={label}\n"
     yield from rows("%d" + ", %d" * n_nodes + "\n", mesh.n_cells + 1 + ids, mesh.cohesive[ids] + 1)
     yield f"*COHESIVE SECTION, ELSET={label}, MATERIAL={label}, RESPONSE=TRACTION SEPARATION, THICKNESS=SPECIFIED\n"

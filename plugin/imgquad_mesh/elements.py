@@ -31,6 +31,8 @@ class ElementOptions:
         Hexes over the thickness.
     periodic : str, optional
         ``x``, ``y`` or ``xy``: tie the nodes of opposite sides, of a mesh made with the same option.
+    open_interfaces : bool
+        Leave the split interfaces open: no cohesive elements between their two sides.
     """
 
     order: int = 1
@@ -39,12 +41,15 @@ class ElementOptions:
     extrude: float | None = None
     layers: int = 1
     periodic: str | None = None
+    open_interfaces: bool = False
 
     def __post_init__(self) -> None:
         if self.order not in (1, 2):
             raise InputError(f"order is {self.order!r}: elements of order 1 and 2 are made")
         if self.order == 2 and self.extrude is not None:
             raise InputError("order 2 and extrusion exclude each other: hexes have 8 nodes")
+        if self.open_interfaces and self.cohesive is None:
+            raise InputError("interfaces: sides is of split interfaces only; say which, with cohesive")
 
     @property
     def plain(self) -> bool:
@@ -54,7 +59,7 @@ class ElementOptions:
 
 def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
     """Return the elements of `mesh` that `options` asks for, with all sets."""
-    from imgquad_core.cohesive import split_interfaces
+    from imgquad_core.cohesive import open_interfaces, split_interfaces
     from imgquad_core.extrusion import extrude
     from imgquad_core.pairing import with_periodic_pairs
     from imgquad_core.second_order import second_order
@@ -69,4 +74,4 @@ def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
         elements = with_periodic_pairs(elements, options.periodic)
     if options.extrude is not None:
         elements = extrude(elements, options.extrude, options.layers)
-    return elements
+    return open_interfaces(elements) if options.open_interfaces else elements

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 #: formats that PyVista writes
 GRID_EXTENSIONS = (".vtu", ".vtk", ".vtkhdf")
 
+HDF_CHUNK = 25_000  #: values, in which VTK's HDF5 writer makes files longer
+
 
 def check_target(path: Path, extensions: tuple[str, ...]) -> None:
     """Raise `InputError` now if `path` could not be written later."""
@@ -121,10 +123,18 @@ def replace_file(path: Path, write: Callable[[Path], Any]) -> None:
 
 
 def save_dataset(dataset: Any, path: Path) -> None:
-    """Save a PyVista dataset: Python writes what VTK formats, as VTK's XML writers abort the process on a full disk."""
+    """Save a PyVista dataset: Python writes what VTK formats, as VTK's XML writers abort the process on a full disk.
+
+    VTK's HDF5 writer does not tell that a disk is full, so room is made sure of before.
+    """
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
     writers = {".vtu": vtkXMLUnstructuredGridWriter, ".vtp": vtkXMLPolyDataWriter}
+    if path.suffix.lower() == ".vtkhdf":
+        from imgquad_core.writers.common import take_room
+
+        arrays = len(dataset.array_names) + 6  # with points, cells
+        take_room(path.parent, 1024 * dataset.GetActualMemorySize() + 8 * HDF_CHUNK * arrays)
     if path.suffix.lower() not in writers:
         with silent_vtk():
             dataset.save(path)

@@ -40,7 +40,7 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
         File to write; replaced only when all of it was written.
     **options
         Of the writer in `imgquad_core.writers`; and before it ``order=2`` (and ``nodes=9``), ``cohesive="all"`` or
-        pairs of names, ``extrude=thickness`` and ``layers=n``.
+        pairs of names (``interfaces="sides"`` for no elements between), ``extrude=thickness`` and ``layers=n``.
 
     Raises
     ------
@@ -55,7 +55,10 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
     from imgquad_mesh.elements import ElementOptions, make_elements
 
     names = [name for name in ("order", "nodes", "cohesive", "extrude", "layers", "periodic") if name in options]
-    elements = ElementOptions(**{name: options.pop(name) for name in names})
+    sides = options.get("interfaces") == "sides"
+    if sides:
+        del options["interfaces"]
+    elements = ElementOptions(**{name: options.pop(name) for name in names}, open_interfaces=sides)
     write_mesh(make_elements(from_grid(dataset), elements), path, **options)
 
 
@@ -77,7 +80,8 @@ def from_grid(dataset: Any, *, folded: bool = False) -> QuadMesh:
 def to_fe_grid(mesh: FEMesh) -> pv.UnstructuredGrid:
     """Return a grid of all elements of `mesh`.
 
-    Cell arrays `material` (int32; -1 of cohesive elements) and `region`; point arrays ``set left`` and so on (uint8,
+    Cell arrays `material` (int32; -1 of cohesive elements), `region` and, if there are cohesive elements,
+    `cohesive_pair` (the materials below and above, -1 of others); point arrays ``set left`` and so on (uint8,
     1 in the set); field arrays `material_numbers`, `material_names`, `material_colors`.
     """
     points = mesh.points if mesh.dimension == 3 else np.column_stack([mesh.points, np.zeros(mesh.n_points)])
@@ -91,6 +95,9 @@ def to_fe_grid(mesh: FEMesh) -> pv.UnstructuredGrid:
     none = np.full(len(mesh.cohesive), -1)
     grid.cell_data["region"] = np.concatenate([mesh.cell_region, none]).astype(np.int32)
     grid.cell_data["material"] = np.concatenate([mesh.cell_material, none]).astype(np.int32)
+    if len(mesh.cohesive):
+        solid = np.full((mesh.n_cells, 2), -1, np.int32)
+        grid.cell_data["cohesive_pair"] = np.concatenate([solid, mesh.cohesive_pair])
     for name, ids in mesh.node_sets.items():
         member = np.zeros(mesh.n_points, np.uint8)
         member[ids] = 1

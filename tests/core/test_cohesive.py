@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handmade import disk, jiggle, round_inclusion, staircase
-from imgquad_core.cohesive import split_interfaces
+from imgquad_core.cohesive import open_interfaces, split_interfaces
 from imgquad_core.errors import InputError
 from imgquad_core.femesh import FEMesh
 from imgquad_core.second_order import second_order
@@ -161,10 +161,45 @@ def test_other_formats_take_them_as_blocks_or_say_no(tmp_path: Path) -> None:
             write_mesh(mesh, tmp_path / f"a{extension}")
     with pytest.raises(InputError, match="were not split"):
         write_mesh(mesh, tmp_path / "a.svg")
-    six = split_interfaces(three(2))
-    for extension in (".inp", ".msh", ".e"):
-        with pytest.raises(InputError, match="six-node"):
-            write_mesh(six, tmp_path / f"six{extension}")
     with pytest.raises(InputError, match="springs need normal_stiffness and shear_stiffness"):
         write_mesh(mesh, tmp_path / "b.inp", interfaces="springs")
-    assert not list(tmp_path.glob("six*")) + list(tmp_path.glob("b.*"))
+    with pytest.raises(InputError, match="'springs', but no interface was split"):
+        write_mesh(three(), tmp_path / "b.inp", interfaces="springs")
+    assert not list(tmp_path.glob("b.*"))
+
+
+@pytest.mark.parametrize("extension", [".inp", ".msh", ".e"])
+def test_six_nodes_are_refused_with_a_remedy_or_left_out(tmp_path: Path, extension: str) -> None:
+    six = split_interfaces(three(2))
+    with pytest.raises(InputError, match=r"no six-node cohesive elements, as order 2 makes them \(6 here\); .*sides"):
+        write_mesh(six, tmp_path / f"six{extension}")
+    assert not list(tmp_path.iterdir())
+    write_mesh(open_interfaces(six), tmp_path / f"six{extension}")
+    assert (tmp_path / f"six{extension}").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_open_interfaces_have_two_sides_in_any_format(tmp_path: Path, order: int) -> None:
+    mesh = open_interfaces(split_interfaces(three(order)))
+    for one, other in (("air", "clay"), ("air", "iron"), ("clay", "iron")):
+        sides = [mesh.side_nodes(mesh.side_sets[f"interface_{a}_{b}"]) for a, b in ((one, other), (other, one))]
+        assert not np.intersect1d(*sides).size
+        places = [set(map(tuple, mesh.points[nodes.ravel()])) for nodes in sides]
+        assert places[0] == places[1]
+    for extension in (".inp", ".msh", ".e", ".bdf", ".npz"):
+        write_mesh(mesh, tmp_path / f"a{extension}")
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.logger.start()
+        gmsh.open(str(tmp_path / "a.msh"))
+        assert not [line for line in gmsh.logger.get() if "Warning" in line or "Error" in line]
+        nodes = {}
+        gmsh.logger.stop()
+        for group in gmsh.model.getPhysicalGroups(1):
+            nodes[gmsh.model.getPhysicalName(*group)] = set(gmsh.model.mesh.getNodesForPhysicalGroup(*group)[0])
+    finally:
+        gmsh.finalize()
+    assert len(nodes["interface_air_iron"]) == len(nodes["interface_iron_air"]) == 2 * order + 1
+    assert nodes["interface_air_iron"].isdisjoint(nodes["interface_iron_air"])

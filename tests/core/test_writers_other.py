@@ -136,8 +136,10 @@ def test_the_archive_holds_everything(tmp_path: Path) -> None:
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
-@pytest.mark.parametrize("extension", sorted(set(WRITERS) - {".med", ".xdmf"}))
+@pytest.mark.parametrize("extension", sorted(WRITERS))
 def test_a_disk_that_fills_up_leaves_the_old_file_and_no_half_one(tmp_path: Path, extension: str) -> None:
+    for package in {".med": ["gmsh"], ".xdmf": ["meshio", "h5py"]}.get(extension, []):
+        pytest.importorskip(package)
     target = tmp_path / f"a{extension}"
     target.write_text("old")
     program = (
@@ -157,10 +159,33 @@ def test_a_disk_that_fills_up_leaves_the_old_file_and_no_half_one(tmp_path: Path
         text=True,
         env={"PYTHONPATH": ":".join(sys.path)},
     )
-    assert "cannot write" in run.stdout, run.stderr
+    assert f"cannot write {target}: " in run.stdout, run.stderr
+    assert (run.returncode, run.stderr) == (0, "")
     assert "nothing was changed" in run.stdout
     assert [p.name for p in tmp_path.iterdir()] == [target.name]
     assert target.read_text() == "old"
+
+
+@pytest.mark.parametrize(
+    ("extension", "limit"), [(".inp", 80), (".bdf", 60), (".msh", 127), (".med", 80), (".e", 255), (".obj", 255)]
+)
+def test_names_as_long_as_the_format_takes_are_whole_and_longer_ones_are_refused(
+    tmp_path: Path, extension: str, limit: int
+) -> None:
+    if extension == ".med":
+        pytest.importorskip("gmsh")
+    longest_name = {".inp": "S_INTERFACE_{}_B", ".obj": "{}"}.get(extension, "interface_{}_b")
+    longest = limit - len(longest_name.format(""))
+    for letters in (longest, longest + 1):
+        mesh = staircase([[0, 1], [0, 1]], ("a" * letters, "b"))
+        path = tmp_path / f"{letters}{extension}"
+        if letters == longest:
+            write_mesh(mesh, path)
+            assert longest_name.format("a" * letters).lower().encode() in path.read_bytes().lower()
+        else:
+            with pytest.raises(InputError, match=f"has {limit + 1} signs, this format takes {limit}"):
+                write_mesh(mesh, path)
+            assert not path.exists()
 
 
 def test_unknown_formats_and_places_are_named(tmp_path: Path) -> None:

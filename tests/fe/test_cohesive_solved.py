@@ -12,6 +12,7 @@ from ccx import needs_ccx, solve
 from handmade import jiggle_beside, round_inclusion, staircase
 from imgquad_core.cohesive import split_interfaces
 from imgquad_core.femesh import FEMesh
+from imgquad_core.pipeline import MeshOptions, mesh_image
 from imgquad_core.second_order import second_order
 from imgquad_core.sets import fe_mesh
 from imgquad_core.writers import write_mesh
@@ -70,6 +71,23 @@ def test_a_slanted_interface_is_stiff_along_its_own_axes(tmp_path: Path, order: 
     stiffness = length * (1000 * np.outer(n, n) + 250 * np.outer(t, t))
     pulled = 1e-3 * np.ptp(mesh.points[:, 0])
     assert force == pytest.approx(stiffness @ [pulled, 0], rel=1e-4)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_stiff_interfaces_hold_a_mesh_with_junctions_together(tmp_path: Path, order: int) -> None:
+    at = np.array([[6, 7], [25, 5], [15, 18], [5, 27], [26, 26]])
+    pixels = np.stack(np.mgrid[0:32, 0:32], axis=-1).reshape(-1, 1, 2)
+    labels = np.square(pixels - at).sum(axis=2).argmin(axis=1).reshape(32, 32) % 4
+    whole = fe_mesh(mesh_image(labels.astype(np.int32), MeshOptions(size=4.0)))
+    assert len(whole.node_sets["junctions"]) == 8
+    whole = second_order(whole) if order == 2 else whole
+    stiff = {"normal_stiffness": 1e10, "shear_stiffness": 1e10}
+    values = {f"material {m}": {"young": 10.0 * 3**m, "poisson": 0.3} for m in range(4)} | {"*:*": stiff}
+    pulls = []
+    for mesh in (whole, split_interfaces(whole)):  # in plane stress CalculiX ties strain across the plane at nodes
+        write_mesh(mesh, tmp_path / "a.inp", analysis="plane strain", properties=values, deck="tension")
+        pulls.append(solve(tmp_path / "a.inp")["total force"][0, 0])
+    assert pulls[1] == pytest.approx(pulls[0], rel=1e-5)
 
 
 def test_a_weak_interface_lets_an_inclusion_go(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from ccx import needs_ccx
-from handmade import disk, staircase
+from handmade import disk, round_inclusion, staircase
+from imgquad_core.model import QuadMesh
 from imgquad_core.pipeline import MeshOptions, mesh_image
 from imgquad_core.second_order import second_order
 from imgquad_core.sets import fe_mesh
@@ -53,12 +54,31 @@ def test_meshed_laminates_are_exact(across: bool) -> None:
     assert found == pytest.approx(exact, rel=1e-3)
 
 
-def test_the_flux_in_a_round_inclusion_is_eshelbys() -> None:
-    radius, n = 40.0, 201
-    mean, rms, _, _ = fe_figures.flux_error(mesh_image(disk(n, radius), MeshOptions(size=3.0)), n / 2, radius, 10.0)
-    coarse = staircase(disk(n // 3, radius / 3)).scaled(3)
-    stairs_mean, stairs_rms, _, _ = fe_figures.flux_error(coarse, n // 3 * 1.5, radius, 10.0)
-    assert mean < 0.01
-    assert rms < 0.01
-    assert stairs_mean > 5 * mean
-    assert stairs_rms > 5 * rms
+@pytest.fixture(scope="module")
+def inclusion() -> tuple[QuadMesh, QuadMesh]:
+    """A disk of radius 40 in 201 x 201 pixels at size 3, meshed and as a staircase."""
+    return mesh_image(disk(201, 40.0), MeshOptions(size=3.0)), staircase(disk(67, 40 / 3)).scaled(3)
+
+
+@pytest.mark.parametrize("k", [10.0, 0.1])
+@pytest.mark.parametrize("element", ["Q4", "Q8", "Q9"])
+def test_the_flux_in_a_round_inclusion_is_eshelbys(
+    inclusion: tuple[QuadMesh, QuadMesh], k: float, element: str
+) -> None:
+    found, stairs = (fe_figures.flux_error(mesh, 100.5, 40.0, k, element) for mesh in inclusion)
+    assert found.mean < 0.002
+    assert found.rms < 0.004
+    assert found.element < 0.01  # the largest of all elements
+    for ours, theirs in zip(found[:4], stairs[:4], strict=True):
+        assert theirs > 5 * ours
+
+
+@pytest.mark.parametrize("centre", [(0.2, 0.1), (0.35, 0.1), (0.5, 0.5)])
+def test_it_is_wherever_the_circle_lies(centre: tuple[float, float]) -> None:
+    mesh = mesh_image(disk(161, 40.0, centre), MeshOptions(size=3.0))
+    assert fe_figures.flux_error(mesh, np.add(80.5, centre), 40.0, 10.0, "Q8").element < 0.01
+
+
+def test_the_flux_in_an_exact_disk_is_exact() -> None:
+    mesh = round_inclusion(16, 40.0, 201.0, 8)
+    assert fe_figures.flux_error(mesh, 100.5, 40.0, 10.0, "Q8").element < 1e-3

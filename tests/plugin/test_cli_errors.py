@@ -190,7 +190,7 @@ def test_two_outputs_of_one_name(picture: Path, tmp_path: Path, capfd: Capture) 
     assert "one name" in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["mesh.vtu", "mesh.vtk", "mesh.inp"])
+@pytest.mark.parametrize("name", ["mesh.vtu", "mesh.vtk", "mesh.vtkhdf", "mesh.inp"])
 def test_full_disk(name: str, picture: Path, tmp_path: Path) -> None:
     kept = tmp_path / name
     kept.write_text("as before")

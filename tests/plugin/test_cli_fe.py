@@ -60,6 +60,12 @@ def test_calculix_conducts_heat_evenly(picture: Path) -> None:
     assert np.abs(found - x / 48).max() < 1e-6
 
 
+@pytest.mark.parametrize("output", ["a.inp", "a.msh", "a.e", "a.bdf", "a.vtu", "a.npz", "a.obj"])
+def test_split_sides_without_elements_go_to_any_format(picture: Path, output: str) -> None:
+    assert run(picture, output, "--cohesive", "all", "--interfaces", "sides", "--order", "2") == 0
+    assert (picture.parent / output).stat().st_size > 1000
+
+
 def test_grids_take_all_elements(picture: Path) -> None:
     assert run(picture, "a.vtu", "--order", "2", "--nodes", "9") == 0
     assert set(pv.read(picture.parent / "a.vtu").celltypes) == {pv.CellType.BIQUADRATIC_QUAD}
@@ -80,6 +86,14 @@ def test_grids_take_all_elements(picture: Path) -> None:
         ("a.inp", ["--order", "2", "--nodes", "9"], "no quad9 for the analysis"),
         ("a.inp", ["--cohesive", "quartz:sand"], "there is no material 'quartz'"),
         ("a.inp", ["--extrude", "-2"], "thickness -2.0 must be positive"),
+        ("a.inp", ["--order", "2", "--cohesive", "all"], "write springs (interfaces: springs) or no elements between"),
+        ("a.msh", ["--order", "2", "--cohesive", "all"], "Gmsh has no six-node cohesive elements"),
+        ("a.e", ["--order", "2", "--cohesive", "all"], "Exodus has no six-node cohesive elements"),
+        ("a.bdf", ["--cohesive", "all"], "Nastran has no cohesive elements; write .inp"),
+        ("a.e", ["--interfaces", "sides"], "say which, with cohesive"),
+        ("a.inp", ["--interfaces", "springs"], "no interface was split"),
+        ("a.inp", ["--analysis", "heat", "--reduced"], "no elements of reduced integration"),
+        ("a.msh", ["--interfaces", "springs", "--cohesive", "all"], ".msh files have no --interfaces springs"),
     ],
 )
 def test_what_cannot_be_written_is_said_in_one_line(

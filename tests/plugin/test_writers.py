@@ -95,6 +95,36 @@ def test_grids_of_all_kinds_have_the_area_and_the_sets(tmp_path: Path, options: 
     assert list(grid.field_data["material_names"]) == ["matrix", "disk"]
 
 
+@pytest.mark.parametrize(("order", "kind"), [(1, 9), (2, 30)])
+def test_cohesive_cells_open_in_the_grid_by_as_much_as_their_sides_part(tmp_path: Path, order: int, kind: int) -> None:
+    mesh = make_elements(round_inclusion(8, 10, 40, 3), ElementOptions(order=order, cohesive="all"))
+    to_fe_grid(mesh).save(tmp_path / "a.vtu")
+    grid = pv.read(tmp_path / "a.vtu")
+    cohesive = grid.extract_cells(np.arange(mesh.n_cells, grid.n_cells))
+    assert set(cohesive.celltypes) == {kind}
+    assert (cohesive["cohesive_pair"] == [0, 1]).all()
+    assert (grid["cohesive_pair"][: mesh.n_cells] == -1).all()
+    rows = grid.cell_connectivity[-mesh.cohesive.size :].reshape(mesh.cohesive.shape)
+    assert (rows == mesh.cohesive).all()
+    upper = np.unique(np.concatenate([mesh.cohesive[:, 2:4], mesh.cohesive[:, 5:]], axis=1))  # on the disk
+    shrunk = grid.points.copy()
+    shrunk[upper] = [20, 20, 0] + 0.99 * (shrunk[upper] - [20, 20, 0])
+    grid.points = shrunk
+    opened = grid.extract_cells(np.arange(mesh.n_cells, grid.n_cells)).compute_cell_sizes()["Area"].sum()
+    ring = np.pi * 100 * (1 - 0.99**2)
+    assert opened == pytest.approx(ring, rel=1e-2 if order == 1 else 2e-3)  # VTK measures sides as two chords
+
+
+def test_interfaces_may_be_left_open(tmp_path: Path) -> None:
+    grid = to_grid(MESH)
+    grid.save(tmp_path / "a.e", cohesive="all", interfaces="sides", order=2)
+    read = pv.read(tmp_path / "a.e")
+    assert list(read["Element Blocks"].keys()) == ["matrix", "disk"]
+    assert {"interface_matrix_disk", "interface_disk_matrix"} <= set(read["Side Sets"].keys())
+    with pytest.raises(InputError, match="say which, with cohesive"):
+        grid.save(tmp_path / "b.e", interfaces="sides")
+
+
 def test_orders_that_are_not_made_are_refused() -> None:
     with pytest.raises(InputError, match="order is 3"):
         ElementOptions(order=3)

@@ -32,7 +32,11 @@ def add_element_options(parser: argparse.ArgumentParser) -> None:
     add("--properties", type=Path, metavar="TOML", help="values of the materials: .inp .bdf")
     add("--deck", metavar="tension|thermal", help="a model that CalculiX runs as it is: .inp")
     add("--regions", action="store_true", default=None, help="an element set for each connected region, too: .inp")
-    add("--interfaces", metavar="elements|springs", help="cohesive elements as COH2D4 or as springs: .inp")
+    add(
+        "--interfaces",
+        choices=("elements", "springs", "sides"),
+        help="between split sides: cohesive elements, springs (.inp), or nothing, just the sides as sets",
+    )
     add("--msh-version", dest="version_", metavar="V", help="4.1 (default) or 2.2: .msh")
 
 
@@ -43,7 +47,8 @@ def element_options(args: argparse.Namespace) -> ElementOptions:
     pairs = args.cohesive
     cohesive = None if pairs is None else "all" if "all" in pairs else pairs
     periodic = None if args.periodic in (None, "none") else args.periodic
-    return ElementOptions(args.order, args.nodes, cohesive, args.extrude, args.layers, periodic)
+    sides = args.interfaces == "sides"
+    return ElementOptions(args.order, args.nodes, cohesive, args.extrude, args.layers, periodic, sides)
 
 
 def writer_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -59,11 +64,14 @@ def writer_options(args: argparse.Namespace) -> dict[str, Any]:
 
     asked = {name: getattr(args, "version_" if name == "version" else name, None) for name in WRITER_OPTIONS}
     given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    if given.get("interfaces") == "sides":  # not the writer's, see `element_options`
+        del given["interfaces"]
     extension = args.output.suffix.lower()
     known = options_of(WRITERS[extension]) if extension in WRITERS else ()
     for name in given:
         if name not in known:
             option = "--msh-version" if name == "version" else f"--{name}"
+            option += f" {given[name]}" if name == "interfaces" else ""
             raise InputError(f"{extension} files have no {option}: leave it out, or write another format")
     if "properties" in given:
         given["properties"] = read_properties(given["properties"])
