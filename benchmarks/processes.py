@@ -1,0 +1,55 @@
+"""Each measurement in a process of its own: peak memory and crashes belong to one mesher only."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+#: of BLAS; the threads that are compared are those of the meshers
+ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+
+
+class FailedError(Exception):
+    """A process that ended without an answer; the message is one line for a table."""
+
+
+def python(*command: object, timeout: float = 900.0, **environment: str) -> str:
+    """Run Python with these arguments; return what it printed.
+
+    Raises
+    ------
+    FailedError
+        It did not end within `timeout` seconds, or not with 0.
+    """
+    paths = [str(ROOT), str(ROOT / "plugin"), *filter(None, [os.environ.get("PYTHONPATH")])]
+    variables = {**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(paths), **environment}
+    arguments = [sys.executable, *map(str, command)]
+    try:
+        done = subprocess.run(arguments, capture_output=True, text=True, env=variables, timeout=timeout, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise FailedError(f"not done after {timeout:.0f} s") from error
+    if done.returncode:
+        said = (done.stderr.strip().splitlines() or ["nothing on stderr"])[-1]
+        raise FailedError(f"exit code {done.returncode}: {said[:160]}")
+    return done.stdout
+
+
+def answer(script: str, *arguments: object) -> dict[str, Any]:
+    """Run a script of this folder that prints JSON in its last line; return it."""
+    found: dict[str, Any] = json.loads(python(HERE / script, *arguments).splitlines()[-1])
+    return found
+
+
+def mesh_picture(picture: Path, mesh: Path, *options: object, **environment: str) -> dict[str, Any]:
+    """Run ``imgquad-mesh run PICTURE MESH`` as a user does; return its report."""
+    report = mesh.with_suffix(".json")
+    command = ("-m", "imgquad_mesh", "run", picture, mesh, "--report", report, "--quiet")
+    python(*command, *options, **environment)
+    found: dict[str, Any] = json.loads(report.read_text(encoding="utf-8"))
+    return found
