@@ -1,0 +1,112 @@
+"""How good are meshes of rocks, ours and Gmsh's? Prints the section "quality" of docs/benchmarks.md.
+
+python benchmarks/quality.py
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from gmsh_routes import ROUTES
+from imgquad_core.meshing import EFFORTS
+from processes import FailedError, answer, mesh_picture
+from rocks import HAS_GENERATOR, SOURCE, draw_rock
+from tables import FIGURES, LIMIT_TITLES, Limit, ours, row, table, theirs
+
+SIDE, SIZE = 1024, 2.0
+OTHER_SEEDS = (12, 13, 14, 15, 16)
+BEST_ROUTE = "subdivide-8"  #: of Gmsh's: the best that inverts nothing on B1
+#: limits of B1 and B2 at an effort
+LIMITS = {
+    "B1 normal": (0.35, 0.80, 0.977, 0.9985, 0.011),
+    "B1 best": (0.40, 0.82, 0.980, 0.9993, 0.008),
+    "B2 normal": (0.30, 0.72, 0.96, 0.995, 0.03),
+}
+LIMITED = ("min SJ", "1 %", "mean SJ", "in [45,135]", "irregular")
+NOISE_REMOVAL = ("--min-pixels", 16, "--min-length", 8)
+Figures = dict[str, float] | FailedError
+
+
+class Rock(NamedTuple):
+    """A rock that is meshed."""
+
+    name: str
+    size: float = SIZE
+    efforts: tuple[str, ...] = ("normal",)
+    routes: tuple[str, ...] = ()
+    drawing: Mapping[str, Any] = MappingProxyType({})
+    options: tuple[Any, ...] = ()
+
+
+CLEAN = [Rock("B1", efforts=tuple(EFFORTS), routes=tuple(ROUTES))]
+VEINED = [Rock("B2", efforts=tuple(EFFORTS), routes=tuple(ROUTES), drawing={"veins": 4})]
+OTHERS = [Rock(f"seed {seed}", drawing={"seed": seed}) for seed in OTHER_SEEDS]
+NOISY = [
+    Rock("5 % noise", 4.0, routes=(BEST_ROUTE,), drawing={"veins": 4, "noise": 0.05}),
+    Rock("5 % noise, removed", 4.0, ("normal",), (BEST_ROUTE,), {"veins": 4, "noise": 0.05}, NOISE_REMOVAL),
+]
+ROCKS = CLEAN + VEINED + OTHERS + NOISY if HAS_GENERATOR else [CLEAN[0]._replace(name="demo rock"), *NOISY]
+
+
+def section(folder: Path) -> str:
+    """Mesh all rocks; return the tables."""
+    found: dict[str, Figures] = {}
+    for rock in ROCKS:
+        found |= measured(rock, folder)
+    parts = [SOURCE, table(("mesh", *FIGURES), (row(*item) for item in found.items()))]
+    if HAS_GENERATOR:
+        parts += [limits(found), spread(found)]
+    return "\n".join(parts)
+
+
+def measured(rock: Rock, folder: Path) -> dict[str, Figures]:
+    """Mesh a rock at its efforts, then the boundaries of the mesh at normal effort by Gmsh's routes."""
+    picture = draw_rock(folder / "rock.png", SIDE, **rock.drawing)
+    found: dict[str, Figures] = {}
+    for effort in rock.efforts:
+        options = ("--size", rock.size, "--effort", effort, *rock.options)
+        found[f"{rock.name} {effort}"] = ours(mesh_picture(picture, folder / f"{effort}.vtu", *options))
+    for route in rock.routes:
+        found[f"{rock.name} Gmsh {route}"] = of_gmsh(folder / "normal.vtu", route, rock.size)
+    return found
+
+
+def of_gmsh(mesh: Path, route: str, size: float) -> Figures:
+    """Return the figures of Gmsh's mesh of the same boundaries, or why there is none."""
+    try:
+        return theirs(answer("gmsh_routes.py", mesh, route), size)
+    except FailedError as error:
+        return error
+
+
+def limits(found: dict[str, Figures]) -> str:
+    """Return the figures of B1 and B2 beside their limits."""
+    rows = []
+    for where, values in LIMITS.items():
+        figures = found[where]
+        assert not isinstance(figures, FailedError)
+        for figure, value in zip(LIMITED, values, strict=True):
+            rows.append(Limit(figure, value, figure == "irregular").row(where, figures[figure], FIGURES[figure]))
+        if where.startswith("B1"):
+            rows.append(Limit("off area/size²", 0.08, True).row(where, abs(figures["× area/size²"] - 1), "{:.1%}"))
+    return table(LIMIT_TITLES, rows)
+
+
+def spread(found: dict[str, Figures]) -> str:
+    """Return the worst of the other seeds beside B1: not more than 10 % worse."""
+    rows = []
+    for figure in LIMITED:
+        fewer = figure == "irregular"
+        worst = (max if fewer else min)(found[f"seed {seed} normal"][figure] for seed in OTHER_SEEDS)  # type: ignore[index]
+        limit = Limit(figure, found["B1 normal"][figure] * (1.1 if fewer else 0.9), fewer)  # type: ignore[index]
+        rows.append(limit.row("worst of seeds 12 to 16, within 10 % of B1", worst, FIGURES[figure]))
+    return table(LIMIT_TITLES, rows)
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as temporary:
+        print(section(Path(temporary)))

@@ -1,0 +1,77 @@
+"""How good are meshes of real pictures, ours and Gmsh's? Prints the section "pictures" of docs/benchmarks.md.
+
+python benchmarks/real_pictures.py [FOLDER]
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from processes import ROOT, FailedError, mesh_picture
+from pyvista_pictures import PICTURES
+from quality import BEST_ROUTE, Figures, of_gmsh
+from tables import FIGURES, LIMIT_TITLES, Limit, ours, row, table
+
+FOLDER = ROOT.parent / "shared" / "images"
+SIZES = (2.0, 5.0)
+GMSH_SIZE = 5.0  #: Gmsh takes minutes at the smaller one
+LARGE = {"oof2_grains_large_5000": (4.0,)}
+#: pictures with clean boundaries
+CLEAN = (
+    "rock_sandstone_labels_2a",
+    "composite_weave_labels_z75",
+    "im2mesh_7phases",
+    "geology_hamersley_west",
+    "steel_duplex_ebsd_phase",
+    "concrete_crack_segmented",
+    "brain_labels_s01_axial",
+)
+LEAST_SJ, LEAST_SJ_CLEAN, GOOD_ANGLES_CLEAN = 0.3, 0.4, 0.99
+
+
+def section(folder: Path, pictures: Path = FOLDER) -> str:
+    """Mesh all pictures; return the tables."""
+    if not pictures.is_dir():
+        return f"**No real pictures: there is no folder {pictures.name}. Nothing is measured here.**\n"
+    found: dict[str, Figures] = {}
+    for picture in sorted(p for p in pictures.iterdir() if p.suffix.lower() in PICTURES):
+        for size in LARGE.get(picture.stem, SIZES):
+            found |= measured(picture, size, folder)
+    note = f"Gmsh meshes the same boundaries by {BEST_ROUTE}, at size {GMSH_SIZE:g} only: others take it long.\n"
+    return "\n".join([note, table(("picture", *FIGURES), (row(*item) for item in found.items())), limits(found)])
+
+
+def measured(picture: Path, size: float, folder: Path) -> dict[str, Figures]:
+    """Mesh a picture, then its boundaries by Gmsh."""
+    name = f"{picture.stem} {size:g}"
+    try:
+        mine: Figures = ours(mesh_picture(picture, folder / "mesh.vtu", "--size", size))
+    except FailedError as error:
+        return {name: error}
+    if size != GMSH_SIZE:
+        return {name: mine}
+    return {name: mine, f"{name} Gmsh": of_gmsh(folder / "mesh.vtu", BEST_ROUTE, size)}
+
+
+def limits(found: dict[str, Figures]) -> str:
+    """Return the worst pictures beside the limits."""
+    good = {name: f for name, f in found.items() if not name.endswith("Gmsh") and not isinstance(f, FailedError)}
+    clean = {name: f for name, f in good.items() if name.startswith(CLEAN)}
+    rows = []
+    for names, figure, least in (
+        (good, "min SJ", LEAST_SJ),
+        (clean, "min SJ", LEAST_SJ_CLEAN),
+        (clean, "in [45,135]", GOOD_ANGLES_CLEAN),
+    ):
+        worst = min(names, key=lambda name: names[name][figure])
+        where = f"worst of {'the clean' if names is clean else 'all'}: {worst}"
+        rows.append(Limit(figure, least, False).row(where, names[worst][figure], FIGURES[figure]))
+    failed = sum(isinstance(f, FailedError) for name, f in found.items() if not name.endswith("Gmsh"))
+    return table(LIMIT_TITLES, [*rows, Limit("pictures without a mesh", 0, True).row("all", failed, "{:.0f}")])
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as temporary:
+        print(section(Path(temporary), *map(Path, sys.argv[1:2])))
