@@ -11,8 +11,8 @@ from pathlib import Path
 
 from processes import ROOT, FailedError, mesh_picture
 from pyvista_pictures import PICTURES
-from quality import BEST_ROUTE, Figures, of_gmsh
-from tables import FIGURES, LIMIT_TITLES, Limit, ours, row, table
+from quality import BEST_ROUTE, Figures, figures_table, of_gmsh
+from tables import FIGURES, LIMIT_TITLES, Limit, ours, table
 
 FOLDER = ROOT.parent / "shared" / "images"
 SIZES = (2.0, 5.0)
@@ -40,7 +40,7 @@ def section(folder: Path, pictures: Path = FOLDER) -> str:
         for size in LARGE.get(picture.stem, SIZES):
             found |= measured(picture, size, folder)
     note = f"Gmsh meshes the same boundaries by {BEST_ROUTE}, at size {GMSH_SIZE:g} only: others take it long.\n"
-    return "\n".join([note, table(("picture", *FIGURES), (row(*item) for item in found.items())), limits(found)])
+    return "\n".join([note, figures_table(found), limits(found)])
 
 
 def measured(picture: Path, size: float, folder: Path) -> dict[str, Figures]:

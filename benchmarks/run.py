@@ -1,7 +1,8 @@
 """Run the benchmarks and put their tables into docs/benchmarks.md.
 
-    python benchmarks/run.py                      all parts, about 15 minutes
+    python benchmarks/run.py                      all but noise, about 15 minutes
     python benchmarks/run.py speed cold           some parts; the others' tables stay as they are
+    python benchmarks/run.py all                  all; noise takes 10 minutes more
     python benchmarks/run.py --out docs/benchmarks.md
 
 Each part prints its section and, with --out, replaces what stands between its two marks in that page. The machine
@@ -22,6 +23,7 @@ from time import perf_counter
 
 import cold_start
 import growth
+import noise
 import quality
 import real_pictures
 import speed
@@ -33,26 +35,30 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "growth": growth.section,
     "cold": cold_start.section,
     "pictures": real_pictures.section,
+    "noise": noise.section,
 }
+STANDARD = [part for part in PARTS if part != "noise"]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "parts", nargs="*", choices=[*PARTS, "all"], default="all", metavar="PART", help=", ".join(PARTS)
-    )
-    parser.add_argument("--out", type=Path, help="page that holds the marks")
+    names = [*PARTS, "all"]
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(names))
+    parser.add_argument("--out", type=Path, metavar="PAGE", help="page that holds the marks")
     given = parser.parse_args()
+    if unknown := set(given.parts) - set(names):
+        parser.error(f"there is no part {', '.join(sorted(unknown))}: give some of {', '.join(names)}")
     if given.out:
         page = given.out.read_text(encoding="utf-8")
         for part in PARTS:
             replaced(page, part, "")  # a mark that is missing is told now, not after minutes
-    for part in PARTS if "all" in given.parts else dict.fromkeys(given.parts):
+    for part in PARTS if "all" in given.parts else given.parts or STANDARD:
+        print(f"## {part}\n", flush=True)
         start = perf_counter()
         with tempfile.TemporaryDirectory(prefix="imgquad-benchmark-") as folder:
             text = PARTS[part](Path(folder))
         text = f"{text}\n{circumstances(part, perf_counter() - start)}\n"
-        print(f"## {part}\n\n{text}", flush=True)
+        print(text, flush=True)
         if given.out:
             page = replaced(given.out.read_text(encoding="utf-8"), part, text)
             given.out.write_text(page, encoding="utf-8")
