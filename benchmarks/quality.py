@@ -100,14 +100,18 @@ def limits(found: dict[str, Figures]) -> str:
 
 
 def spread(found: dict[str, Figures]) -> str:
-    """Return the worst of the other seeds beside B1: not more than 10 % worse."""
+    """Return the worst of the other seeds beside B1: at most 10 % worse, and within the limits of B1."""
     rows = []
-    for figure in LIMITED:
+    for figure, value in zip(LIMITED, LIMITS["B1 normal"], strict=True):
         fewer = figure == "irregular"
-        worst = (max if fewer else min)(found[f"seed {seed} normal"][figure] for seed in OTHER_SEEDS)  # type: ignore[index]
-        limit = Limit(figure, found["B1 normal"][figure] * (1.1 if fewer else 0.9), fewer)  # type: ignore[index]
-        rows.append(limit.row("worst of seeds 12 to 16, within 10 % of B1", worst, FIGURES[figure]))
-    return table(LIMIT_TITLES, rows)
+        first: float = found["B1 normal"][figure]  # type: ignore[index]
+        worst: float = (max if fewer else min)(found[f"seed {seed} normal"][figure] for seed in OTHER_SEEDS)  # type: ignore[index]
+        worse = worst / first - 1 if fewer else 1 - worst / first
+        met = worse <= 0.1 and Limit(figure, value, fewer).met(worst)
+        form = FIGURES[figure].format
+        rows.append([figure, form(first), form(worst), f"{worse:+.1%}", form(value), "yes" if met else "**no**"])
+    worst_seed = f"worst of seeds {OTHER_SEEDS[0]} to {OTHER_SEEDS[-1]}"
+    return table(("figure", "B1", worst_seed, "worse by (≤ 10 %)", "limit of B1", "met"), rows)
 
 
 if __name__ == "__main__":
