@@ -20,7 +20,7 @@ class FailedError(Exception):
 
 
 def python(*command: object, timeout: float = 900.0, **environment: str) -> str:
-    """Run Python with these arguments; return what it printed.
+    """Run Python with these arguments, and say so on stderr; return what it printed.
 
     Raises
     ------
@@ -30,6 +30,7 @@ def python(*command: object, timeout: float = 900.0, **environment: str) -> str:
     paths = [str(ROOT), str(ROOT / "plugin"), *filter(None, [os.environ.get("PYTHONPATH")])]
     variables = {**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(paths), **environment}
     arguments = [sys.executable, *map(str, command)]
+    print("python", *arguments[1:], file=sys.stderr, flush=True)
     try:
         done = subprocess.run(arguments, capture_output=True, text=True, env=variables, timeout=timeout, check=False)
     except subprocess.TimeoutExpired as error:
