@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from processes import mesh_picture
 from rocks import draw_rock
-from tables import LIMIT_TITLES, Limit, table
+from tables import Limit, limit_table
 
 SIDE = 128
 CACHED_RUNS = 3
@@ -38,7 +38,7 @@ def section(folder: Path) -> str:
         Limit("extra seconds of the first run", EXTRA_SECONDS, True).row(where, extra, "{:.1f}"),
         Limit("seconds of a later run", CACHED_SECONDS, True).row(where, cached.seconds, "{:.2f}"),
     ]
-    return "\n".join([note, table(LIMIT_TITLES, checks)])
+    return "\n".join([note, limit_table(checks)])
 
 
 class Spent(NamedTuple):

@@ -13,7 +13,7 @@ import numpy as np
 
 from processes import mesh_picture
 from rocks import draw_rock
-from tables import LIMIT_TITLES, Limit, table
+from tables import Limit, limit_table, table
 
 SIDES = (256, 512, 1024, 2048, 4096)
 LARGEST = f"{SIDES[-1]}²"
@@ -51,7 +51,7 @@ def section(folder: Path) -> str:
         "16 x 16 pixels: Python, its packages and the kernels. The exponent is the slope of log seconds over log quads "
         "by least squares; small pictures hide in it what every run costs, hence the second range.\n"
     )
-    return "\n".join([note, table(TITLES, rows), table(LIMIT_TITLES, checks)])
+    return "\n".join([note, table(TITLES, rows), limit_table(checks)])
 
 
 def exponent(quads: np.ndarray, seconds: np.ndarray) -> float:

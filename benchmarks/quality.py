@@ -15,7 +15,7 @@ from gmsh_routes import ROUTES
 from imgquad_core.meshing import EFFORTS
 from processes import FailedError, answer, mesh_picture
 from rocks import HAS_GENERATOR, SOURCE, draw_rock
-from tables import FIGURES, LIMIT_TITLES, Limit, ours, row, table, theirs
+from tables import FIGURES, Limit, limit_table, ours, row, table, theirs
 
 SIDE, SIZE = 1024, 2.0
 OTHER_SEEDS = (12, 13, 14, 15, 16)
@@ -96,7 +96,7 @@ def limits(found: dict[str, Figures]) -> str:
             rows.append(Limit(figure, value, figure == "irregular").row(where, figures[figure], FIGURES[figure]))
         if where.startswith("B1"):
             rows.append(Limit("off area/size²", 0.08, True).row(where, abs(figures["× area/size²"] - 1), "{:.1%}"))
-    return table(LIMIT_TITLES, rows)
+    return limit_table(rows)
 
 
 def spread(found: dict[str, Figures]) -> str:

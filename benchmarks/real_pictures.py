@@ -12,7 +12,7 @@ from pathlib import Path
 from processes import ROOT, FailedError, mesh_picture
 from pyvista_pictures import PICTURES
 from quality import BEST_ROUTE, Figures, figures_table, of_gmsh
-from tables import FIGURES, LIMIT_TITLES, Limit, ours, table
+from tables import FIGURES, Limit, limit_table, ours
 
 FOLDER = ROOT.parent / "shared" / "images"
 SIZES = (2.0, 5.0)
@@ -69,7 +69,7 @@ def limits(found: dict[str, Figures]) -> str:
         where = f"worst of {'the clean' if names is clean else 'all'}: {worst}"
         rows.append(Limit(figure, least, False).row(where, names[worst][figure], FIGURES[figure]))
     failed = sum(isinstance(f, FailedError) for name, f in found.items() if not name.endswith("Gmsh"))
-    return table(LIMIT_TITLES, [*rows, Limit("pictures without a mesh", 0, True).row("all", failed, "{:.0f}")])
+    return limit_table([*rows, Limit("pictures without a mesh", 0, True).row("all", failed, "{:.0f}")])
 
 
 if __name__ == "__main__":

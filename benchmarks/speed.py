@@ -27,7 +27,7 @@ from imgquad_core.smoothing import smooth_boundaries
 from processes import answer, mesh_picture
 from quality import BEST_ROUTE, ROCKS, SIDE, SIZE
 from rocks import SOURCE, draw_rock
-from tables import LIMIT_TITLES, Limit, table
+from tables import Limit, limit_table, table
 
 ROUNDS = 3
 THREADS = (1, 2)
@@ -60,7 +60,7 @@ def section(folder: Path) -> str:
         "meshers take turns, each run in a process of its own. *Times faster* is in seconds for the same boundaries, "
         "then in CPU seconds, which count all threads, then in quads a second, of which Gmsh makes more.\n"
     )
-    return "\n".join([note, table(TITLES, rows), *([table(LIMIT_TITLES, checks)] if checks else [])])
+    return "\n".join([note, table(TITLES, rows), *([limit_table(checks)] if checks else [])])
 
 
 def best_of_rounds(picture: Path, mesh: Path) -> dict[tuple[str, int], dict[str, Any]]:

@@ -42,13 +42,15 @@ class Limit(NamedTuple):
         return [where, self.figure, f"{sign} {limit}", value, "yes" if self.met(found) else "**no**"]
 
 
-LIMIT_TITLES = ("where", "figure", "limit", "found", "met")
+def table(titles: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1) -> str:
+    """Return a table whose first columns, of `words`, are on the left, the others on the right."""
+    marks = ["---"] * words + ["---:"] * (len(titles) - words)
+    return "\n".join("| " + " | ".join(line) + " |" for line in (titles, marks, *rows)) + "\n"
 
 
-def table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table whose first column is on the left, the others on the right."""
-    lines = [titles, ["---", *["---:"] * (len(titles) - 1)], *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+def limit_table(rows: Iterable[Sequence[str]]) -> str:
+    """Return the table of rows of `Limit`s."""
+    return table(("where", "figure", "limit", "found", "met"), rows, words=2)
 
 
 def ours(report: dict[str, Any]) -> dict[str, float]:
