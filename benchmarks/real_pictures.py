@@ -41,8 +41,8 @@ def section(folder: Path, pictures: Path = FOLDER) -> str:
         for size in LARGE.get(picture.stem, SIZES):
             found |= measured(picture, size, folder)
     note = (
-        f"Gmsh meshes the same boundaries by {BEST_ROUTE}, at size {GMSH_SIZE:g} where we make at most {MOST_QUADS:,} quads: "
-        "more would take it minutes.\n"
+        f"Gmsh meshes the same boundaries by {BEST_ROUTE}, at size {GMSH_SIZE:g} where we make at most {MOST_QUADS:,} "
+        "quads: more would take it minutes.\n"
     )
     return "\n".join([note, figures_table(found), limits(found)])
 
