@@ -11,9 +11,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
+from figure_tables import Limit, limit_table
 from processes import mesh_picture
 from rocks import draw_rock
-from tables import Limit, limit_table
 
 SIDE = 128
 CACHED_RUNS = 3

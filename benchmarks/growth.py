@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from figure_tables import Limit, limit_table, table
 from processes import mesh_picture
 from rocks import draw_rock
-from tables import Limit, limit_table, table
 
 SIDES = (256, 512, 1024, 2048, 4096)
 LARGEST = f"{SIDES[-1]}²"

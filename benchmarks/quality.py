@@ -11,11 +11,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from figure_tables import FIGURES, Limit, limit_table, ours, row, table, theirs
 from gmsh_routes import ROUTES
 from imgquad_core.meshing import EFFORTS
 from processes import FailedError, answer, mesh_picture
 from rocks import HAS_GENERATOR, SOURCE, draw_rock
-from tables import FIGURES, Limit, limit_table, ours, row, table, theirs
 
 SIDE, SIZE = 1024, 2.0
 OTHER_SEEDS = (12, 13, 14, 15, 16)

@@ -9,10 +9,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from figure_tables import FIGURES, Limit, limit_table, ours
 from processes import ROOT, FailedError, mesh_picture
 from pyvista_pictures import PICTURES
 from quality import BEST_ROUTE, Figures, figures_table, of_gmsh
-from tables import FIGURES, Limit, limit_table, ours
 
 FOLDER = ROOT.parent / "shared" / "images"
 SIZES = (2.0, 5.0)

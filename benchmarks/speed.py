@@ -16,6 +16,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
+from figure_tables import Limit, limit_table, table
 from imgquad_core.boundary import extract_boundaries
 from imgquad_core.meshing import EFFORTS, mesh_boundaries
 from imgquad_core.pipeline import MeshOptions
@@ -27,7 +28,6 @@ from imgquad_core.smoothing import smooth_boundaries
 from processes import answer, mesh_picture
 from quality import BEST_ROUTE, ROCKS, SIDE, SIZE
 from rocks import SOURCE, draw_rock
-from tables import Limit, limit_table, table
 
 ROUNDS = 3
 THREADS = (1, 2)
