@@ -47,9 +47,9 @@ def python(*command: object, timeout: float = 900.0, **environment: str) -> str:
     return done.stdout
 
 
-def answer(script: str, *arguments: object) -> dict[str, Any]:
+def answer(script: str, *arguments: object, timeout: float = 900.0) -> dict[str, Any]:
     """Run a script of this folder that prints JSON in its last line; return it."""
-    found: dict[str, Any] = json.loads(python(HERE / script, *arguments).splitlines()[-1])
+    found: dict[str, Any] = json.loads(python(HERE / script, *arguments, timeout=timeout).splitlines()[-1])
     return found
 
 

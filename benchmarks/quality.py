@@ -19,6 +19,7 @@ from rocks import HAS_GENERATOR, SOURCE, draw_rock
 
 SIDE, SIZE = 1024, 2.0
 OTHER_SEEDS = (12, 13, 14, 15, 16)
+PATIENCE = 120.0  #: seconds that Gmsh may take for a mesh, its start included
 BEST_ROUTE = "subdivide-8"  #: of Gmsh's: the best that inverts nothing on B1
 #: limits of B1 and B2 at an effort
 LIMITS = {
@@ -81,7 +82,7 @@ def measured(rock: Rock, folder: Path) -> dict[str, Figures]:
 def of_gmsh(mesh: Path, route: str, size: float) -> Figures:
     """Return the figures of Gmsh's mesh of the same boundaries, or why there is none."""
     try:
-        return theirs(answer("gmsh_routes.py", mesh, route), size)
+        return theirs(answer("gmsh_routes.py", mesh, route, timeout=PATIENCE), size)
     except FailedError as error:
         return error
 
