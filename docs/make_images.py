@@ -1,8 +1,9 @@
-"""Draw the pictures of the README and of docs/: python docs/make_images.py [FOLDER]."""
+"""Draw the pictures of the README and of docs/, some with Gmsh: python docs/make_images.py [FOLDER]."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
-from imgquad_core import MeshOptions, Run, run
-from imgquad_core.quality import inner_nodes, scaled_jacobian
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+from gmsh_routes import gmsh_mesh
+from imgquad_core import MeshOptions, QuadMesh, Run, run
+from imgquad_core.quality import inner_nodes, quality_report, scaled_jacobian
 from imgquad_mesh.drawing import PALETTE, rock_labels
 
 COLORS = np.array(PALETTE) / 255
@@ -24,7 +28,9 @@ def main(folder: Path) -> None:
     part = rock_labels()[50:176, 60:249]
     made = run(part.astype(np.int32), MeshOptions(size=4.5, min_pixels=12, min_length=6, effort="best"))
     draw_chain(made, part, folder / "rock.png")
-    draw_quality(made, folder / "quality.png")
+    draw_quality({"": made.mesh}, made.labels.shape, folder / "quality.png")
+    both = {"imgquad-mesh": made.mesh, "Gmsh": gmsh_mesh(made.mesh, "subdivide-8").mesh}
+    draw_quality(both, made.labels.shape, folder / "quality_gmsh.png")
 
 
 def draw_chain(made: Run, part: Any, path: Path) -> None:
@@ -35,20 +41,30 @@ def draw_chain(made: Run, part: Any, path: Path) -> None:
     lines = [made.boundary.points[made.boundary.chain(c)] for c in range(made.boundary.n_chains)]
     panels[1].imshow(COLORS[made.labels.labels], extent=(0, cols, 0, rows), interpolation="nearest", alpha=0.35)
     panels[1].add_collection(LineCollection(lines, colors="black", linewidths=1.0))
-    _add_quads(panels[2], made, COLORS[made.mesh.quad_material])
+    _add_quads(panels[2], made.mesh, COLORS[made.mesh.quad_material])
     figure.savefig(path, facecolor="white")
 
 
-def draw_quality(made: Run, path: Path) -> None:
-    """Draw the mesh coloured by scaled Jacobian, with its irregular inner nodes."""
-    figure, (panel,) = _panels(1, made.labels.shape)
-    quality = _add_quads(panel, made, None)
-    quality.set_array(scaled_jacobian(made.mesh.points, made.mesh.quads))
-    quality.set_clim(0.4, 1.0)
-    irregular = inner_nodes(made.mesh) & (made.mesh.valence != 4)
-    panel.plot(*made.mesh.points[irregular].T, "o", ms=4, mfc="red", mec="black", mew=0.5)
-    figure.colorbar(quality, ax=panel, label="scaled Jacobian", shrink=0.8)
+def draw_quality(meshes: Mapping[str, QuadMesh], shape: tuple[int, int], path: Path) -> None:
+    """Draw meshes coloured by scaled Jacobian, with their irregular inner nodes, side by side."""
+    figure, panels = _panels(len(meshes), shape)
+    for panel, (title, mesh) in zip(panels, meshes.items(), strict=True):
+        quality = _add_quads(panel, mesh, None)
+        quality.set_array(scaled_jacobian(mesh.points, mesh.quads))
+        quality.set_clim(0.4, 1.0)
+        irregular = inner_nodes(mesh) & (mesh.valence != 4)
+        panel.plot(*mesh.points[irregular].T, "o", ms=4, mfc="red", mec="black", mew=0.5)
+        if title:
+            panel.add_collection(LineCollection(list(mesh.points[mesh.constraints]), colors="black", linewidths=1.2))
+            panel.set_title(f"{title}: {_figures(mesh)}", fontsize=8)
+    figure.colorbar(quality, ax=panels, label="scaled Jacobian", shrink=0.8)
     figure.savefig(path, facecolor="white")
+
+
+def _figures(mesh: QuadMesh) -> str:
+    found = quality_report(mesh)
+    shape = f"scaled Jacobian at least {found.min_sj:.2f}, {found.mean_sj:.3f} on average"
+    return f"{found.n_quads} quads, {found.irregular:.1%} of inner nodes irregular\n{shape}"
 
 
 def _panels(n: int, shape: tuple[int, int]) -> tuple[Figure, list[Any]]:
@@ -61,9 +77,9 @@ def _panels(n: int, shape: tuple[int, int]) -> tuple[Figure, list[Any]]:
     return figure, panels
 
 
-def _add_quads(panel: Any, made: Run, colors: Any) -> PolyCollection:
+def _add_quads(panel: Any, mesh: QuadMesh, colors: Any) -> PolyCollection:
     quads = PolyCollection(
-        list(made.mesh.points[made.mesh.quads]), facecolors=colors, edgecolors="black", linewidths=0.35, cmap="viridis"
+        list(mesh.points[mesh.quads]), facecolors=colors, edgecolors="black", linewidths=0.35, cmap="viridis"
     )
     panel.add_collection(quads)
     return quads
