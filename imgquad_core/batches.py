@@ -36,7 +36,8 @@ def _batches(mesh: FaceQuads) -> list[FaceQuads]:
     batch = batch_of_face[mesh.face]
     order = np.lexsort((_tile(mesh), mesh.face, batch))
     ends = np.flatnonzero(np.diff(batch[order])) + 1
-    return [_part(mesh, chosen) for chosen in np.split(order, ends)]
+    new = np.full(len(mesh.points), -1, np.int64)  # one for all parts: they share no point
+    return [_part(mesh, chosen, new) for chosen in np.split(order, ends)]
 
 
 def _tile(mesh: FaceQuads) -> Ids:
@@ -47,18 +48,17 @@ def _tile(mesh: FaceQuads) -> Ids:
     return np.asarray(cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0])
 
 
-def _part(mesh: FaceQuads, quads: Ids) -> FaceQuads:
-    """Take some quads out, with their points numbered by first use."""
-    local, ids = _renumber(mesh.quads[quads], len(mesh.points))
+def _part(mesh: FaceQuads, quads: Ids, new: Ids) -> FaceQuads:
+    """Take some quads out, with their points numbered by first use; `new` holds -1 for each of these."""
+    local = mesh.quads[quads]
+    ids = _renumber(local, new)
     return FaceQuads(mesh.points[ids], local, mesh.face[quads], mesh.origin[ids], mesh.wanted[ids])
 
 
 @kernel
-def _renumber(quads: Ids, n_points: int) -> tuple[Ids, Ids]:
-    """Number the points of `quads` by first use; return the quads in new ids and the old id of each."""
-    new = np.full(n_points, -1, np.int64)
+def _renumber(quads: Ids, new: Ids) -> Ids:
+    """Number the points of `quads` by first use, in place and in `new`; return the old id of each."""
     ids = np.empty(quads.size, np.int64)
-    local = np.empty_like(quads)
     n = 0
     for q in range(len(quads)):
         for k in range(4):
@@ -67,8 +67,8 @@ def _renumber(quads: Ids, n_points: int) -> tuple[Ids, Ids]:
                 new[v] = n
                 ids[n] = v
                 n += 1
-            local[q, k] = new[v]
-    return local, ids[:n].copy()
+            quads[q, k] = new[v]
+    return ids[:n].copy()
 
 
 def joined(parts: list[FaceQuads]) -> FaceQuads:
@@ -86,7 +86,7 @@ def joined(parts: list[FaceQuads]) -> FaceQuads:
 def faces_only(mesh: FaceQuads, faces: NDArray[np.bool_]) -> FaceQuads:
     """Keep the quads of the flagged faces."""
     keep = np.flatnonzero(faces[mesh.face])
-    return mesh if len(keep) == len(mesh.face) else _part(mesh, keep)
+    return mesh if len(keep) == len(mesh.face) else _part(mesh, keep, np.full(len(mesh.points), -1, np.int64))
 
 
 def no_quads() -> FaceQuads:

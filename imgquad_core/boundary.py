@@ -206,7 +206,9 @@ def _label_runs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Region of each run of equal pixels in a row (-1 for void ones), and the first run of each region."""
     n_rows, n_cols = labels.shape
-    parent = np.arange(len(starts))
+    parent = np.empty(len(starts), np.int64)
+    for k in range(len(starts)):
+        parent[k] = k
     for i in range(1, n_rows):
         above, here = rows[i - 1], rows[i]
         base_above, base = (i - 1) * n_cols, i * n_cols
@@ -224,7 +226,7 @@ def _label_runs(
                     _unite(parent, above + 1, here)
             above += end_above <= end
             here += end <= end_above
-    region = np.full(len(starts), -1)
+    region = np.full(len(starts), -1, np.int64)
     first_run = np.empty(len(starts), np.int64)
     n_regions = 0
     for k in range(len(starts)):

@@ -63,7 +63,7 @@ def _place(curves: Curves, is_corner: Flags, room: Floats, lengths: Floats, poin
 def _find(curves: Curves) -> Flags:
     score = np.zeros(len(curves.raw))
     is_corner = np.zeros(len(curves.raw), np.bool_)
-    x, y, s, q, sums = np.empty(99), np.empty(99), np.empty(99), np.ones(99), np.empty(14)
+    x, y, s, q, sums = np.empty(99), np.empty(99), np.empty(99), np.full(99, 1.0), np.empty(14)
     for c in range(len(curves.ends)):
         if curves.is_frame[c]:
             continue

@@ -111,7 +111,7 @@ def sample_weights(points: Floats, offsets: Ints) -> Floats:
             if _side(points, i) >= 0:
                 weight[i] = 1.0
                 if run[i] == 1 and first < i < last:
-                    weight[i] = min(run[i - 1], run[i + 1], _LONGEST_RUN) ** 2
+                    weight[i] = min(min(run[i - 1], run[i + 1]), _LONGEST_RUN) ** 2
     return weight
 
 

@@ -152,7 +152,7 @@ def _copies(points: Points, triangles: Ids, twins: Ids) -> tuple[Ids, Ids, NDArr
     copy = np.full((len(triangles), 3), -1, np.int64)
     origin = np.empty(3 * len(triangles), np.int64)
     on_rim = np.zeros(3 * len(triangles), np.bool_)
-    angle = np.empty(3 * len(triangles), np.float64)
+    angle = np.empty(3 * len(triangles))
     n = 0
     for start in range(3 * len(triangles)):
         if copy[start // 3, start % 3] >= 0:

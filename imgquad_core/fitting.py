@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.curves import Floats, Ints, arc_lengths
+from imgquad_core.curves import Floats, Ints
 from imgquad_core.jit import kernel, verb
 
 WINDOWS = (3.0, 4.5, 6.5, 9.5, 14.0, 20.0, 30.0, 45.0, 65.0)  #: half widths that are tried, px of arc
@@ -276,11 +276,17 @@ def fit_pieces(
         at = _extend(points, arc, weight, first, last, closed[k], widest, out)
         x, y, s, q = out[0], out[1], out[2], out[3]
         _choose_windows(x, y, s, q, at, at + n, widest, windows, w)
-        width[: n + 1] = w[at : at + n + 1]
+        widest_chosen = 0.0
+        for j in range(n + 1):
+            width[j] = w[at + j]
+            widest_chosen = max(widest_chosen, width[j])
         piece = fitted[first : last + 1]
         _put_quadratics(x, y, s, q, at, width, closed[k], piece, sums)
-        if width[: n + 1].max() > _DETAIL:
-            true_arc[first : last + 1] = arc_lengths(piece, np.array([0, n + 1]))
+        if widest_chosen > _DETAIL:
+            true_arc[first] = 0.0
+            for j in range(n):
+                step = np.hypot(piece[j + 1, 0] - piece[j, 0], piece[j + 1, 1] - piece[j, 1])
+                true_arc[first + j + 1] = true_arc[first + j] + step
             at = _extend(points, true_arc, weight, first, last, closed[k], _WIDER * widest, out)
             _put_quartics(x, y, s, q, at, width, closed[k], piece, matrix)
     return fitted

@@ -328,7 +328,7 @@ def _approach(points: Points, rings: Rings, late: Flags, targets: Points) -> Fla
 @kernel
 def worst_of_faces(points: Points, quads: Ids, face: Ids, n_faces: int) -> Points:
     """Worst scaled Jacobian of each face's quads, 1 where it has none."""
-    worst = np.ones(n_faces)
+    worst = np.full(n_faces, 1.0)
     for q in range(len(quads)):
         worst[face[q]] = min(worst[face[q]], quad_quality(points, quads, q))
     return worst
