@@ -194,7 +194,9 @@ def _poor_rim(parts: list[FaceQuads], limit: float) -> Ids:
     """Return the boundary points of quads not above `limit`, and all those of a face whose such quads have none."""
     found = []
     for part in parts:
-        poor = np.flatnonzero(scaled_jacobian(part.points, part.quads) <= limit)
+        worst = worst_of_faces(part.points, part.quads, part.face, part.face.max(initial=-1) + 1)
+        looked_at = np.flatnonzero(worst[part.face] <= limit)
+        poor = looked_at[scaled_jacobian(part.points, part.quads[looked_at]) <= limit]
         origin = part.origin[part.quads[poor]]
         inner = np.setdiff1d(part.face[poor], part.face[poor[(origin >= 0).any(axis=1)]])
         found += [origin.ravel(), part.origin[part.quads[np.isin(part.face, inner)]].ravel()]
