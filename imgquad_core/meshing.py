@@ -364,7 +364,7 @@ def _slid(mesh: QuadMesh, rounds: int) -> QuadMesh:
     for _ in range(rounds):
         slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
         newton(points, rings, free, 2, GOOD)
-    untangle(points, rings, free, 2, FAIR)
+    untangle(points, rings, free, 4, FAIR)
     return replace(mesh, points=points)
 
 
