@@ -53,7 +53,7 @@ BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge l
 FIT_ROUNDS = 6
 POOR = 0.7  # scaled Jacobian below which single quads are replaced
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
-WORST = 0.3  # below it the boundary's edges at the quad are halved, in
+WORST = 0.42  # below it the boundary's edges at the quad are halved, in
 WISHES = 2  # rounds at most; at folded quads in
 REFITS = 16  # rounds, of which
 PATIENCE = 6  # reach no farther
@@ -196,7 +196,9 @@ def _poor_rim(parts: list[FaceQuads], limit: float) -> Ids:
     """Return the boundary points of quads not above `limit`, and all those of a face whose such quads have none."""
     found = []
     for part in parts:
-        poor = np.flatnonzero(scaled_jacobian(part.points, part.quads) <= limit)
+        worst = worst_of_faces(part.points, part.quads, part.face, part.face.max(initial=-1) + 1)
+        looked_at = np.flatnonzero(worst[part.face] <= limit)
+        poor = looked_at[scaled_jacobian(part.points, part.quads[looked_at]) <= limit]
         origin = part.origin[part.quads[poor]]
         inner = np.setdiff1d(part.face[poor], part.face[poor[(origin >= 0).any(axis=1)]])
         found += [origin.ravel(), part.origin[part.quads[np.isin(part.face, inner)]].ravel()]
@@ -367,7 +369,7 @@ def _slid(mesh: QuadMesh, rounds: int) -> QuadMesh:
     for _ in range(rounds):
         slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
         newton(points, rings, free, 2, GOOD)
-    untangle(points, rings, free, 2, FAIR)
+    untangle(points, rings, free, 4, FAIR)
     return replace(mesh, points=points)
 
 

@@ -25,6 +25,7 @@ GUARD = 0.6  # a move may lower a ring's worst scaled Jacobian down to this, not
 TOLERANCE = 0.01  # of the edge length: smaller moves stop the activity of a node
 GOOD = 0.9  # Newton works on rings with a quad below this
 BAD = 0.35  # the pattern search works on rings below this
+SHORT = 0.25  # of the longest edge at a node: the pattern search makes no edge there shorter, for angles alone
 POWER = 4  # of the inverse mean ratio in Newton's energy
 HALVINGS = 6
 
@@ -248,6 +249,18 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
 
 
 @kernel
+def _reach_of(points: Points, rings: Rings, v: int) -> tuple[float, float]:
+    """Lengths of the shortest and the longest edge at node v."""
+    shortest, longest = np.inf, 0.0
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        c = rings.corners[i]
+        w = rings.quads[c >> 2, (c + 1) & 3]
+        length = np.hypot(points[w, 0] - points[v, 0], points[w, 1] - points[v, 1])
+        shortest, longest = min(shortest, length), max(longest, length)
+    return shortest, longest
+
+
+@kernel
 def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float) -> int:
     """Raise the worst scaled Jacobian of rings below `bad` by a pattern search, in place; return the rings left bad."""
     left = 0
@@ -259,12 +272,8 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
             if is_ring_above(points, rings, v, bad):
                 continue
             best = ring_quality(points, rings, v)
-            step = 0.0
-            for i in range(rings.offsets[v], rings.offsets[v + 1]):
-                c = rings.corners[i]
-                w = rings.quads[c >> 2, (c + 1) & 3]
-                step = max(step, np.hypot(points[w, 0] - points[v, 0], points[w, 1] - points[v, 1]))
-            step *= 0.3
+            shortest, longest = _reach_of(points, rings, v)
+            room, step = min(shortest, SHORT * longest), 0.3 * longest
             for _ in range(8):
                 x, y = points[v, 0], points[v, 1]
                 best_x, best_y = x, y
@@ -272,7 +281,7 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
                     points[v, 0] = x + step * np.cos(d * np.pi / 4)
                     points[v, 1] = y + step * np.sin(d * np.pi / 4)
                     quality = ring_quality(points, rings, v)
-                    if quality > best + 1e-9:
+                    if quality > best + 1e-9 and (best <= 0.0 or _reach_of(points, rings, v)[0] >= room):
                         best, best_x, best_y = quality, points[v, 0], points[v, 1]
                 points[v, 0], points[v, 1] = best_x, best_y
                 if best_x == x and best_y == y:
