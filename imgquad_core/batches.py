@@ -14,6 +14,7 @@ from .splitting import FaceQuads
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
+Part = TypeVar("Part")
 Result = TypeVar("Result")
 
 BATCH = 3000  # quads, so that a batch stays in the cache
@@ -22,7 +23,11 @@ TILE = 8  # edge lengths; quads of a batch are numbered tile by tile
 
 def in_batches(mesh: FaceQuads, work: Callable[[FaceQuads], Result], threads: int) -> list[Result]:
     """Call `work` for groups of whole faces; the results come in the order of the batches, whatever the threads."""
-    parts = _batches(mesh)
+    return in_threads(_batches(mesh), work, threads)
+
+
+def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) -> list[Result]:
+    """Call `work` for each part; the results come in the order of the parts, whatever the threads."""
     if threads == 1 or len(parts) == 1:
         return [work(part) for part in parts]
     with ThreadPoolExecutor(threads) as pool:

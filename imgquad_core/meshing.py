@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import aside
-from .batches import faces_only, in_batches, joined, no_quads
+from .batches import faces_only, in_batches, in_threads, joined, no_quads
 from .composing import compose
 from .crossfield import cross_field
 from .cutting import CutMesh, FaceConflict, cut_at_constraints
@@ -172,7 +172,7 @@ def mesh_boundaries(
         poor = _poor_rim(done, WORST if attempt < WISHES else 0.0)
         if len(poor) == 0:
             mesh = _stitch(graph, parts, materials or _materials_of(graph.region_label))
-            return _slid(mesh, EFFORTS[options.effort].slides)
+            return _slid(mesh, EFFORTS[options.effort].slides, options.threads)
         finer = _refined(graph, poor, attempt)
         finer = _consistent(finer, _differ(graph, finer))
         todo = _faces_beside(graph, _differ(graph, finer))
@@ -362,15 +362,25 @@ def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) 
     )
 
 
-def _slid(mesh: QuadMesh, rounds: int) -> QuadMesh:
+def _slid(mesh: QuadMesh, rounds: int, threads: int) -> QuadMesh:
     """Let boundary nodes slide, and the nodes inside follow."""
     points, gone = mesh.points.copy(), np.zeros(mesh.n_points)
-    rings, free = rings_of(mesh.quads, mesh.n_points), mesh.point_kind == PointKind.INTERIOR
+    rings, groups = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads)
     for _ in range(rounds):
         slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
-        newton(points, rings, free, 2, GOOD)
-    untangle(points, rings, free, 4, FAIR)
+        in_threads(groups, lambda free: newton(points, rings, free, 2, GOOD), threads)
+    in_threads(groups, lambda free: untangle(points, rings, free, 4, FAIR), threads)
     return replace(mesh, points=points)
+
+
+def _inner_nodes(mesh: QuadMesh, n_groups: int) -> list[Flags]:
+    """Return the nodes inside faces in groups of whole faces: those of one do not feel those of another."""
+    share = np.bincount(mesh.quad_region, minlength=len(mesh.region_label)) / mesh.n_quads
+    group_of_face = np.floor((np.cumsum(share) - 0.5 * share) * n_groups)
+    group = np.zeros(mesh.n_points)
+    group[mesh.quads] = group_of_face[mesh.quad_region][:, None]
+    inner = mesh.point_kind == PointKind.INTERIOR
+    return [inner & (group == g) for g in range(n_groups)]
 
 
 def _materials_of(labels: NDArray[np.int32]) -> Materials:

@@ -248,7 +248,7 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             break
 
 
-@kernel
+@verb
 def _reach_of(points: Points, rings: Rings, v: int) -> tuple[float, float]:
     """Lengths of the shortest and the longest edge at node v."""
     shortest, longest = np.inf, 0.0
