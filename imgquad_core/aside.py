@@ -47,15 +47,26 @@ def wait() -> None:
 
 
 def compile_last_stages() -> None:
-    """Compile the optimisation of quads, by using it on one."""
+    """Compile how triangles become quads, which the first process needs first, and how quads are optimised."""
+    from .composing import compose
+    from .cutting import CutMesh
     from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
     from .repair import repair
     from .sliding import slide
-    from .splitting import FaceQuads
+    from .splitting import FaceQuads, middles_of, split_composed, split_quads
     from .topology import CleanUp, clean_up
+    from .triangulation import constraint_table
 
+    #   3---2   two triangles, and the quad of both
+    #   | / |
+    #   0---1
     points, ids = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.arange(4)
+    triangles, twins = np.array([[0, 1, 2], [0, 2, 3]]), np.array([-1, -1, 3, 2, -1, -1])
+    cut = CutMesh(points, triangles, twins, np.zeros(2, np.int64), ids, np.ones(4, bool), np.ones(4), np.full(6, -1))
+    split_composed(cut, compose(cut), 4)
     mesh = FaceQuads(points, ids[None, :].copy(), np.zeros(1, np.int64), ids, np.ones(4, np.int64))
+    table = constraint_table(4, ids, np.roll(ids, -1), ids, ids, ids)
+    split_quads(mesh, np.full(4, -1), middles_of(mesh.quads, np.full(4, -1), ids, table))
     clean_up(mesh, CleanUp((1,), 0.0, 0.0))
     repair(mesh, 2.0)
     rings, none = rings_of(mesh.quads, 4), np.zeros(4, bool)

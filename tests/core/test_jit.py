@@ -55,10 +55,11 @@ def test_the_share_on_disk_is_a_share() -> None:
 
 
 ASIDE = """
-from imgquad_core import aside, mesh_image, MeshOptions, relaxation, repair, sliding, topology
+from imgquad_core import aside, composing, mesh_image, MeshOptions, relaxation, repair, sliding, splitting, topology
 import numpy as np
 aside.compile_last_stages()
-kernels = [k for m in (relaxation, repair, sliding, topology) for k in vars(m).values() if hasattr(k, "signatures")]
+modules = (composing, relaxation, repair, sliding, splitting, topology)
+kernels = [k for m in modules for k in vars(m).values() if hasattr(k, "signatures")]
 before = {id(k): len(k.signatures) for k in kernels}
 labels = np.zeros((40, 60), np.int32)
 labels[10:30, 15:40] = 1
