@@ -49,6 +49,7 @@ def wait() -> None:
 def compile_last_stages() -> None:
     """Compile how triangles become quads, which the first process needs first, and how quads are optimised."""
     from .composing import compose
+    from .crossfield import cross_field
     from .cutting import CutMesh
     from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
     from .repair import repair
@@ -63,6 +64,7 @@ def compile_last_stages() -> None:
     points, ids = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.arange(4)
     triangles, twins = np.array([[0, 1, 2], [0, 2, 3]]), np.array([-1, -1, 3, 2, -1, -1])
     cut = CutMesh(points, triangles, twins, np.zeros(2, np.int64), ids, np.ones(4, bool), np.ones(4), np.full(6, -1))
+    cross_field(cut, np.ones(4), 0.3)
     split_composed(cut, compose(cut), 4)
     mesh = FaceQuads(points, ids[None, :].copy(), np.zeros(1, np.int64), ids, np.ones(4, np.int64))
     table = constraint_table(4, ids, np.roll(ids, -1), ids, ids, ids)

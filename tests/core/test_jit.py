@@ -55,10 +55,11 @@ def test_the_share_on_disk_is_a_share() -> None:
 
 
 ASIDE = """
-from imgquad_core import aside, composing, mesh_image, MeshOptions, relaxation, repair, sliding, splitting, topology
+from imgquad_core import aside, composing, crossfield, relaxation, repair, sliding, splitting, topology
+from imgquad_core import mesh_image, MeshOptions
 import numpy as np
 aside.compile_last_stages()
-modules = (composing, relaxation, repair, sliding, splitting, topology)
+modules = (composing, crossfield, relaxation, repair, sliding, splitting, topology)
 kernels = [k for m in modules for k in vars(m).values() if hasattr(k, "signatures")]
 before = {id(k): len(k.signatures) for k in kernels}
 labels = np.zeros((40, 60), np.int32)
