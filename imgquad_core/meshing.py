@@ -51,6 +51,7 @@ STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
+LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
 POOR = 0.7  # scaled Jacobian below which single quads are replaced
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
 WORST = 0.42  # below it the boundary's edges at the quad are halved, in
@@ -232,7 +233,9 @@ def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> l
     effort = EFFORTS[options.effort]
     wide = wide_faces(graph, LEAST_WIDTH) & todo
     coarse = _mesh_wide(graph, wide, effort.wide, options)
-    fine = _mesh_level(graph, todo & (~wide | (coarse.worst < effort.again_below)), 2, effort.narrow, options)
+    large = np.bincount(coarse.quads.face, minlength=len(todo)) > LARGE
+    again = wide & (coarse.worst < np.where(large, min(WORST, effort.again_below), effort.again_below))
+    fine = _mesh_level(graph, todo & ~wide | again, 2, effort.narrow, options)
     better = fine.meshed & ~(wide & (coarse.worst >= fine.worst))
     return [faces_only(coarse.quads, ~better), faces_only(fine.quads, better)]
 

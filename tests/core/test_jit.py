@@ -66,13 +66,14 @@ labels = np.zeros((40, 60), np.int32)
 labels[10:30, 15:40] = 1
 mesh_image(labels, MeshOptions(size=2.0))
 print(sorted(k.__name__ for k in kernels if before[id(k)] and len(k.signatures) > before[id(k)]))
-print(sum(n > 0 for n in before.values()) > 20)
+names = ("_clean_pass", "_repair_pass", "newton", "slide")
+print(sorted(k.__name__ for k in kernels if before[id(k)] and k.__name__ in names))
 """
 
 
 def test_the_second_process_compiles_what_the_first_one_calls() -> None:
     done = subprocess.run([sys.executable, "-c", ASIDE], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == ["[]", "True"]
+    assert done.stdout.splitlines() == ["[]", "['_clean_pass', '_repair_pass', 'newton', 'slide']"]
 
 
 def test_arrays_that_may_be_read_only_compile_no_kernel_again() -> None:
