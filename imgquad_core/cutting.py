@@ -115,25 +115,14 @@ def _flood_regions(twins: Ids, left: Ids) -> tuple[Ids, Ids]:
     return face, bad[:n_bad]
 
 
-@kernel
 def _compress(triangles: Ids, twins: Ids, middle: Ids, keep: NDArray[np.bool_]) -> tuple[Ids, Ids, Ids]:
     """Keep some triangles and renumber their twins."""
-    new = np.full(len(triangles), -1, np.int64)
-    n = 0
-    for t in range(len(triangles)):
-        if keep[t]:
-            new[t] = n
-            n += 1
-    kept, kept_twins, kept_middle = np.empty((n, 3), np.int64), np.full(3 * n, -1, np.int64), np.empty(3 * n, np.int64)
-    for t in range(len(triangles)):
-        if keep[t]:
-            for k in range(3):
-                kept[new[t], k] = triangles[t, k]
-                kept_middle[3 * new[t] + k] = middle[3 * t + k]
-                h = twins[3 * t + k]
-                if h >= 0 and keep[h // 3]:
-                    kept_twins[3 * new[t] + k] = 3 * new[h // 3] + h % 3
-    return kept, kept_twins, kept_middle
+    if keep.all():
+        return triangles, twins, middle
+    new, kept = np.cumsum(keep) - 1, np.repeat(keep, 3)
+    twins = twins[kept]
+    stays = (twins >= 0) & keep[twins // 3]
+    return triangles[keep], np.where(stays, 3 * new[twins // 3] + twins % 3, -1), middle[kept]
 
 
 @verb

@@ -66,7 +66,7 @@ labels = np.zeros((40, 60), np.int32)
 labels[10:30, 15:40] = 1
 mesh_image(labels, MeshOptions(size=2.0))
 print(sorted(k.__name__ for k in kernels if before[id(k)] and len(k.signatures) > before[id(k)]))
-print(sum(n > 0 for n in before.values()) > 20)
+print(sum(n > 0 for n in before.values()) > 15)
 """
 
 
