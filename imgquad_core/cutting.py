@@ -94,12 +94,10 @@ def _flood_regions(twins: Ids, left: Ids) -> tuple[Ids, Ids]:
 
 def _compress(triangles: Ids, twins: Ids, middle: Ids, keep: NDArray[np.bool_]) -> tuple[Ids, Ids, Ids]:
     """Keep some triangles and renumber their twins."""
-    if keep.all():
-        return triangles, twins, middle
-    new, kept = np.cumsum(keep) - 1, np.repeat(keep, 3)
-    twins = twins[kept]
-    stays = (twins >= 0) & keep[twins // 3]
-    return triangles[keep], np.where(stays, 3 * new[twins // 3] + twins % 3, -1), middle[kept]
+    kept = np.flatnonzero(keep)
+    new = np.full(twins.size + 1, -1, np.int64)  # the last one for the rim, twin -1
+    new[:-1].reshape(-1, 3)[kept] = np.arange(3 * len(kept)).reshape(-1, 3)
+    return triangles[kept], new[twins.reshape(-1, 3)[kept]].ravel(), middle.reshape(-1, 3)[kept].ravel()
 
 
 @verb
