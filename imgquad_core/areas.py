@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from imgquad_core.curves import Floats, Ints
-from imgquad_core.jit import kernel
+from imgquad_core.curves import Floats, Ints, Places, places_of
 
 _STEPS = 5
 _SMALL = 50  # px; smaller regions take what cannot be given to all
@@ -32,8 +31,7 @@ def polygon_areas(points: Floats, chain_points: Ints, offsets: Ints, sides: Ints
     n_regions : int
         Number of regions.
     """
-    nowhere = np.zeros(len(chain_points))
-    return _areas(_sweep(points, chain_points, offsets, nowhere, points, np.zeros(len(sides)))[0], sides, n_regions)
+    return _areas(_swept(points, places_of(chain_points, offsets), len(sides)), sides, n_regions)
 
 
 def _areas(swept: Floats, sides: Ints, n_regions: int) -> Floats:
@@ -69,65 +67,44 @@ def restore_areas(
     shift : float64, shape (n_chains,)
         How far each chain went to its left, where its points' bounds let it.
     """
-    normal = _normals(points, chain_points, offsets, bound)
-    moved = _moved(points, chain_points, offsets, bound, normal, shift)
+    places, most = places_of(chain_points, offsets), bound.max()
+    bound = bound[places.at]
+    normal = _normals(points, places)
+    moved = _moved(points, places, bound, normal, shift)
     for _ in range(_STEPS):
-        swept, growth = _sweep(moved, chain_points, offsets, bound, normal, shift)
-        missing = target - _areas(swept, sides, len(target))
+        missing = target - _areas(_swept(moved, places, len(shift)), sides, len(target))
         if np.all(np.abs(missing) <= _GOOD * target):
             break
-        shift = np.clip(shift + _shifts(np.maximum(growth, 0.0), sides, missing, target), -bound.max(), bound.max())
-        moved = _moved(points, chain_points, offsets, bound, normal, shift)
+        weight = np.maximum(_growth(moved, places, bound, normal, shift), 0.0)
+        shift = np.clip(shift + _shifts(weight, sides, missing, target), -most, most)
+        moved = _moved(points, places, bound, normal, shift)
     return moved, shift
 
 
-@kernel
-def _normals(points: Floats, chain_points: Ints, offsets: Ints, bound: Floats) -> Floats:
-    """Left normal at every movable place of the chains."""
-    normal = np.zeros((len(chain_points), 2))
-    for c in range(len(offsets) - 1):
-        for k in range(offsets[c], offsets[c + 1] - 1):
-            if bound[k] > 0:
-                a, b = _beside(chain_points, offsets, c, k)
-                x, y = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-                length = max(np.hypot(x, y), 1e-12)
-                normal[k, 0], normal[k, 1] = -y / length, x / length
-    return normal
+def _normals(points: Floats, places: Places) -> Floats:
+    """Left normal at each place."""
+    along = points[places.after] - points[places.before]
+    length = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-12)
+    return np.stack([-along[:, 1] / length, along[:, 0] / length], axis=1)
 
 
-@kernel
-def _beside(chain_points: Ints, offsets: Ints, c: int, k: int) -> tuple[int, int]:
-    """Points before and after place k of chain c; only closed chains have one before their first."""
-    before = k - 1 if k > offsets[c] else offsets[c + 1] - 2
-    return chain_points[before], chain_points[k + 1]
+def _swept(points: Floats, places: Places, n_chains: int) -> Floats:
+    """Area that each chain sweeps about the origin."""
+    p, q = points[places.here], points[places.after]
+    return np.asarray(np.bincount(places.chain, 0.5 * (p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]), n_chains), np.float64)
 
 
-@kernel
-def _sweep(
-    points: Floats, chain_points: Ints, offsets: Ints, bound: Floats, normal: Floats, shift: Floats
-) -> tuple[Floats, Floats]:
-    """Area that each chain sweeps about the origin, and its growth by a unit of further shift."""
-    swept, growth = np.zeros(len(shift)), np.zeros(len(shift))
-    for c in range(len(shift)):
-        for k in range(offsets[c], offsets[c + 1] - 1):
-            p, q = chain_points[k], chain_points[k + 1]
-            swept[c] += 0.5 * (points[p, 0] * points[q, 1] - points[q, 0] * points[p, 1])
-            if bound[k] > abs(shift[c]):
-                a, b = _beside(chain_points, offsets, c, k)
-                x, y = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-                growth[c] += 0.5 * (normal[k, 1] * x - normal[k, 0] * y)
-    return swept, growth
+def _growth(points: Floats, places: Places, bound: Floats, normal: Floats, shift: Floats) -> Floats:
+    """How much the area that each chain sweeps grows by a unit of further shift."""
+    along = points[places.after] - points[places.before]
+    growth = 0.5 * (normal[:, 1] * along[:, 0] - normal[:, 0] * along[:, 1])
+    growth[bound <= np.abs(shift)[places.chain]] = 0.0
+    return np.asarray(np.bincount(places.chain, growth, len(shift)), np.float64)
 
 
-@kernel
-def _moved(points: Floats, chain_points: Ints, offsets: Ints, bound: Floats, normal: Floats, shift: Floats) -> Floats:
+def _moved(points: Floats, places: Places, bound: Floats, normal: Floats, shift: Floats) -> Floats:
     moved = points.copy()
-    for c in range(len(shift)):
-        for k in range(offsets[c], offsets[c + 1] - 1):
-            if bound[k] > 0:
-                d = min(max(shift[c], -bound[k]), bound[k])
-                moved[chain_points[k], 0] += d * normal[k, 0]
-                moved[chain_points[k], 1] += d * normal[k, 1]
+    moved[places.here] += np.clip(shift[places.chain], -bound, bound)[:, None] * normal
     return moved
 
 

@@ -54,9 +54,8 @@ def compile_last_stages() -> None:
     from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
     from .repair import repair
     from .sliding import slide
-    from .splitting import FaceQuads, middles_of, split_composed, split_quads
+    from .splitting import FaceQuads, split_composed, split_quads
     from .topology import CleanUp, clean_up
-    from .triangulation import constraint_table
 
     #   3---2   two triangles, and the quad of both
     #   | / |
@@ -67,8 +66,7 @@ def compile_last_stages() -> None:
     cross_field(cut, np.ones(4), 0.3)
     split_composed(cut, compose(cut), 4)
     mesh = FaceQuads(points, ids[None, :].copy(), np.zeros(1, np.int64), ids, np.ones(4, np.int64))
-    table = constraint_table(4, ids, np.roll(ids, -1), ids, ids, ids)
-    split_quads(mesh, np.full(4, -1), middles_of(mesh.quads, np.full(4, -1), ids, table))
+    split_quads(mesh, np.full(4, -1), np.full(4, -1))
     clean_up(mesh, CleanUp((1,), 0.0, 0.0))
     repair(mesh, 2.0)
     rings, none = rings_of(mesh.quads, 4), np.zeros(4, bool)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.curves import Flags, Floats, Ints
+from imgquad_core.curves import Flags, Floats, Ints, places_of
 from imgquad_core.features import add_up
 from imgquad_core.jit import kernel, verb
 
@@ -187,7 +187,6 @@ def _is_close(points: Floats, a: int, b: int, c: int, d: int) -> bool:
     return False
 
 
-@kernel
 def mark_sharp(
     points: Floats,
     chain_points: Ints,
@@ -197,40 +196,27 @@ def mark_sharp(
     least: float,
     marks: NDArray[np.uint8],
 ) -> None:
-    """Mark the segments on both sides of sectors of less than `least` radians, in place."""
-    for c in range(len(offsets) - 1):
-        first, last = offsets[c], offsets[c + 1] - 1
-        for i in range(first, last):
-            before = chain_points[i - 1] if i > first else chain_points[last - 1]
-            if i == first and chain_points[first] != chain_points[last]:
-                continue
-            if _sector(points, chain_points[i], before, chain_points[i + 1]) < least:
-                k = i - c
-                previous = k - 1 if i > first else last - 1 - c
-                _raise(marks, k, SHARP)
-                _raise(marks, previous, SHARP)
-    for v in range(len(node_offsets) - 1):
-        for i in range(node_offsets[v], node_offsets[v + 1]):
-            k, p = _first_segment(sockets[i], chain_points, offsets)
-            for j in range(i + 1, node_offsets[v + 1]):
-                other, q = _first_segment(sockets[j], chain_points, offsets)
-                if _sector(points, v, p, q) < least:
-                    _raise(marks, k, SHARP)
-                    _raise(marks, other, SHARP)
+    """Mark the segments on both sides of sectors of less than `least` radians (below a right angle), in place."""
+    places = places_of(chain_points, offsets)
+    first = offsets[:-1] - np.arange(len(offsets) - 1)  # segments of each chain
+    last = offsets[1:] - 2 - np.arange(len(offsets) - 1)
+    previous = np.arange(len(marks)) - 1
+    previous[first] = last
+    is_sharp = _is_sharp(points, places.here, places.before, places.after, least)
+    is_sharp[first] &= chain_points[offsets[:-1]] == chain_points[offsets[1:] - 1]
+    sharp = [np.flatnonzero(is_sharp), previous[is_sharp]]
+    node = np.repeat(np.arange(len(node_offsets) - 1), np.diff(node_offsets))
+    segment = np.where(sockets % 2, last[sockets // 2], first[sockets // 2])
+    far = np.where(sockets % 2, places.here[segment], places.after[segment])
+    for step in range(1, int(np.diff(node_offsets).max(initial=0))):
+        a = np.flatnonzero(node[step:] == node[:-step])
+        a = a[_is_sharp(points, node[a], far[a], far[a + step], least)]
+        sharp += [segment[a], segment[a + step]]
+    found = np.concatenate(sharp)
+    marks[found] = np.maximum(marks[found], SHARP)
 
 
-@verb
-def _first_segment(socket: int, chain_points: Ints, offsets: Ints) -> tuple[int, int]:
-    """Segment of a chain at one of its ends, and the point at the far side of it."""
-    c = socket // 2
-    if socket % 2:
-        return offsets[c + 1] - 2 - c, chain_points[offsets[c + 1] - 2]
-    return offsets[c] - c, chain_points[offsets[c] + 1]
-
-
-@verb
-def _sector(points: Floats, v: int, p: int, q: int) -> float:
-    """Angle between the segments from v to p and to q."""
-    ux, uy = points[p, 0] - points[v, 0], points[p, 1] - points[v, 1]
-    wx, wy = points[q, 0] - points[v, 0], points[q, 1] - points[v, 1]
-    return float(abs(np.arctan2(ux * wy - uy * wx, ux * wx + uy * wy)))
+def _is_sharp(points: Floats, v: Ints, p: Ints, q: Ints, least: float) -> Flags:
+    """Tell where the angle between the segments from v to p and to q is less than `least`."""
+    (ux, uy), (wx, wy) = (points[p] - points[v]).T, (points[q] - points[v]).T
+    return np.asarray(np.abs(ux * wy - uy * wx) < np.tan(least) * (ux * wx + uy * wy))

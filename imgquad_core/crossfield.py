@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cutting import CutMesh
+from .halfedge import corners_at
 from .jit import kernel
 
 Ids = NDArray[np.int64]
@@ -53,55 +54,27 @@ def cross_field(mesh: CutMesh, max_size: Points, growth: float) -> CrossField:
     return CrossField(cross, size)
 
 
-@kernel
 def _neighbors(triangles: Ids, twins: Ids, n_points: int) -> tuple[Ids, Ids]:
     """Return CSR (offsets, neighbors) of the points that share an edge."""
-    flat = triangles.ravel()
-    offsets = np.zeros(n_points + 1, np.int64)
-    for h in range(twins.size):
-        if twins[h] < h:
-            offsets[flat[h] + 1] += 1
-            offsets[flat[h - h % 3 + (h % 3 + 1) % 3] + 1] += 1
-    for v in range(n_points):
-        offsets[v + 1] += offsets[v]
-    fill = offsets[:-1].copy()
-    neighbors = np.empty(offsets[n_points], np.int64)
-    for h in range(twins.size):
-        if twins[h] < h:
-            a, b = flat[h], flat[h - h % 3 + (h % 3 + 1) % 3]
-            neighbors[fill[a]] = b
-            neighbors[fill[b]] = a
-            fill[a] += 1
-            fill[b] += 1
-    return offsets, neighbors
+    edges = np.stack([triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()], axis=1)
+    edges = edges[twins < np.arange(twins.size)]
+    offsets, places = corners_at(edges, n_points)
+    return offsets, edges.ravel()[places ^ 1]
 
 
-@kernel
 def _rim_values(points: Points, triangles: Ids, twins: Ids, max_size: Points) -> tuple[Points, Points]:
     """Return cross (0 inside) and size (`max_size` inside) as the rim's edges tell them."""
-    cross = np.zeros((len(points), 2))
-    total = np.zeros(len(points))
-    count = np.zeros(len(points))
-    flat = triangles.ravel()
-    for h in range(twins.size):
-        if twins[h] < 0:
-            a, b = flat[h], flat[h - h % 3 + (h % 3 + 1) % 3]
-            dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-            turn, length = 4.0 * np.arctan2(dy, dx), np.hypot(dx, dy)
-            for v in (a, b):
-                cross[v, 0] += np.cos(turn)
-                cross[v, 1] += np.sin(turn)
-                total[v] += length
-                count[v] += 1.0
-    size = max_size.copy()
-    for v in range(len(points)):
-        if count[v] > 0:
-            size[v] = total[v] / count[v]
-            norm = np.hypot(cross[v, 0], cross[v, 1])
-            if norm > 1e-9:
-                cross[v, 0] /= norm
-                cross[v, 1] /= norm
-    return cross, size
+    n, rim = len(points), np.flatnonzero(twins < 0)
+    ends = np.stack([triangles.ravel()[rim], np.roll(triangles, -1, axis=1).ravel()[rim]], axis=1)
+    step = points[ends[:, 1]] - points[ends[:, 0]]
+    turn, length = 4.0 * np.arctan2(step[:, 1], step[:, 0]), np.hypot(step[:, 0], step[:, 1])
+    cos, sin, total, count = (
+        np.bincount(ends.ravel(), np.repeat(value, 2), n)
+        for value in (np.cos(turn), np.sin(turn), length, np.ones(len(rim)))
+    )
+    norm = np.hypot(cos, sin)
+    cross = np.stack([cos, sin], axis=1) / np.where(norm > 1e-9, norm, 1.0)[:, None]
+    return cross, np.where(count > 0, total / np.maximum(count, 1.0), max_size)
 
 
 @kernel

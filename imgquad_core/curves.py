@@ -32,6 +32,25 @@ class Curves(NamedTuple):
     is_frame: Flags  #: (n_chains,) lies on the picture's border
 
 
+class Places(NamedTuple):
+    """Places of chains where a segment begins: all but the last one of each chain."""
+
+    chain: Ints  #: (m,)
+    at: Ints  #: (m,) index among all places
+    here: Ints  #: (m,) id of the point there
+    before: Ints  #: (m,) id of the one before; at the first place that before the last, which is right if it is closed
+    after: Ints  #: (m,) id of the next one
+
+
+def places_of(chain_points: Ints, offsets: Ints) -> Places:
+    """Return the places of chains that have the points ``chain_points[offsets[c]:offsets[c + 1]]``."""
+    at = np.delete(np.arange(len(chain_points)), offsets[1:] - 1)
+    before = at - 1
+    before[offsets[:-1] - np.arange(len(offsets) - 1)] = offsets[1:] - 2
+    chain = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets) - 1)
+    return Places(chain, at, chain_points[at], chain_points[before], chain_points[at + 1])
+
+
 class Ends(NamedTuple):
     """The points that chains end at."""
 
@@ -123,19 +142,16 @@ def _side(points: Floats, i: int) -> int:
     return 1 if points[i, 1] != np.floor(points[i, 1]) else -1
 
 
-@kernel
 def pin_ends(points: Floats, curves: Curves, node: Floats) -> None:
     """Put chain ends on their nodes, in place; chains on the border become straight between theirs."""
-    for c in range(len(curves.ends)):
-        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
-        if curves.ends[c, 0] < 0:
-            points[last, 0], points[last, 1] = points[first, 0], points[first, 1]
-            continue
-        v, w = curves.ends[c, 0], curves.ends[c, 1]
-        for k in range(2):
-            points[first, k], points[last, k] = node[v, k], node[w, k]
-            for i in range(first + 1, last if curves.is_frame[c] else first):
-                points[i, k] = node[v, k] + curves.arc[i] / curves.arc[last] * (node[w, k] - node[v, k])
+    first, last = curves.offsets[:-1], curves.offsets[1:] - 1
+    is_open = curves.ends[:, 0] >= 0
+    points[last[~is_open]] = points[first[~is_open]]
+    on_frame = np.flatnonzero(per_point(curves, is_open & curves.is_frame))
+    c = np.searchsorted(curves.offsets, on_frame, side="right") - 1
+    start, end = node[curves.ends[c, 0]], node[curves.ends[c, 1]]
+    points[on_frame] = start + (curves.arc[on_frame] / curves.arc[last[c]])[:, None] * (end - start)
+    points[first[is_open]], points[last[is_open]] = node[curves.ends[is_open, 0]], node[curves.ends[is_open, 1]]
 
 
 def per_point(curves: Curves, values: NDArray[Any]) -> NDArray[Any]:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .halfedge import components
 from .jit import kernel, verb
 from .triangulation import Constraints, Triangles
 
@@ -80,60 +81,23 @@ def _open_constraints(triangles: Ids, twins: Ids, constraints: Constraints) -> t
     return left, middle
 
 
-@kernel
 def _flood_regions(twins: Ids, left: Ids) -> tuple[Ids, Ids]:
     """Return the region of each triangle, and the regions that meet inside one face (none if all is well)."""
-    n = twins.size // 3
-    face = np.full(n, -3, np.int64)
-    stack = np.empty(n, np.int64)
-    bad = np.empty(2 * n, np.int64)
-    n_bad = 0
-    for seed in range(n):
-        if face[seed] != -3:
-            continue
-        region = np.int64(-2)
-        face[seed] = -2
-        stack[0] = seed
-        top, done = 1, 0
-        while done < top:  # a queue, so that all triangles of the face stay listed in stack[:top]
-            t = stack[done]
-            done += 1
-            for h in range(3 * t, 3 * t + 3):
-                if left[h] != -2:
-                    if region == -2:
-                        region = left[h]
-                    elif region != left[h] and n_bad + 2 <= bad.size:
-                        bad[n_bad] = region
-                        bad[n_bad + 1] = left[h]
-                        n_bad += 2
-                if twins[h] >= 0 and face[twins[h] // 3] == -3:
-                    face[twins[h] // 3] = -2
-                    stack[top] = twins[h] // 3
-                    top += 1
-        for i in range(top):
-            face[stack[i]] = max(region, -1)
-    return face, bad[:n_bad]
+    face, n_faces = components(twins, 3)
+    told = np.flatnonzero(left != -2)
+    at = face[told // 3]
+    region = np.full(n_faces, -1, np.int64)
+    region[at] = left[told]
+    bad = region[at] != left[told]
+    return region[face], np.concatenate([region[at[bad]], left[told[bad]]])
 
 
-@kernel
 def _compress(triangles: Ids, twins: Ids, middle: Ids, keep: NDArray[np.bool_]) -> tuple[Ids, Ids, Ids]:
     """Keep some triangles and renumber their twins."""
-    new = np.full(len(triangles), -1, np.int64)
-    n = 0
-    for t in range(len(triangles)):
-        if keep[t]:
-            new[t] = n
-            n += 1
-    kept, kept_twins, kept_middle = np.empty((n, 3), np.int64), np.full(3 * n, -1, np.int64), np.empty(3 * n, np.int64)
-    for t in range(len(triangles)):
-        if keep[t]:
-            for k in range(3):
-                kept[new[t], k] = triangles[t, k]
-                kept_middle[3 * new[t] + k] = middle[3 * t + k]
-                h = twins[3 * t + k]
-                if h >= 0 and keep[h // 3]:
-                    kept_twins[3 * new[t] + k] = 3 * new[h // 3] + h % 3
-    return kept, kept_twins, kept_middle
+    kept = np.flatnonzero(keep)
+    new = np.full(twins.size + 1, -1, np.int64)  # the last one for the rim, twin -1
+    new[:-1].reshape(-1, 3)[kept] = np.arange(3 * len(kept)).reshape(-1, 3)
+    return triangles[kept], new[twins.reshape(-1, 3)[kept]].ravel(), middle.reshape(-1, 3)[kept].ravel()
 
 
 @verb

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from imgquad_core.curves import Curves, Floats, Ints
+from imgquad_core.halfedge import corners_at
 from imgquad_core.jit import kernel, verb
 
 _REACH = (
@@ -53,36 +54,18 @@ def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float
         stride, level = 4 * stride, min(4 * level, reach)
 
 
-@kernel
 def _every(offsets: Ints, stride: int) -> Ints:
-    ids = np.empty(offsets[-1], np.int64)
-    n = 0
-    for c in range(len(offsets) - 1):
-        for i in range(offsets[c], offsets[c + 1] - 1, stride):
-            ids[n] = i
-            n += 1
-        ids[n] = offsets[c + 1] - 1
-        n += 1
-    return ids[:n]
+    """Every `stride`-th point of each chain, and its last."""
+    is_taken = (np.arange(offsets[-1]) - np.repeat(offsets[:-1], np.diff(offsets))) % stride == 0
+    is_taken[offsets[1:] - 1] = True
+    return np.flatnonzero(is_taken)
 
 
-@kernel
 def bucket(points: Floats, ids: Ints, cell: float, n_across: int, n_up: int) -> tuple[Ints, Ints]:
     """Sort the points `ids` into square cells: CSR offsets, items."""
-    start = np.zeros(n_across * n_up + 1, np.int64)
-    items = np.empty(len(ids), np.int64)
-    for fill in range(2):
-        for k in range(len(ids) - 1, -1, -1):
-            i = ids[k]
-            at = int(points[i, 1] / cell) * n_across + int(points[i, 0] / cell)
-            if fill:
-                start[at] -= 1
-                items[start[at]] = i
-            else:
-                start[at] += 1
-        if not fill:
-            add_up(start)
-    return start, items
+    column, row = (points[ids] / cell).astype(np.int64).T
+    start, places = corners_at((row * n_across + column)[:, None], n_across * n_up)
+    return start, ids[places]
 
 
 @verb

@@ -77,33 +77,22 @@ def spokes_of_rim(mesh: CutMesh) -> Spokes:
     return Spokes(start, mesh.angle, quads, triangle)
 
 
-@kernel
 def _first_rim_edges(points: Points, triangles: Ids, twins: Ids) -> tuple[Points, Ids]:
     """Return direction and triangle of the rim half-edge that leaves each rim point."""
     start = np.zeros(len(points))
     triangle = np.full(len(points), -1, np.int64)
-    for h in range(twins.size):
-        if twins[h] < 0:
-            t, k = h // 3, h % 3
-            a, b = triangles[t, k], triangles[t, (k + 1) % 3]
-            start[a] = np.arctan2(points[b, 1] - points[a, 1], points[b, 0] - points[a, 0])
-            triangle[a] = t
+    rim = np.flatnonzero(twins < 0)
+    tail, head = triangles.ravel()[rim], np.roll(triangles, -1, axis=1).ravel()[rim]
+    x, y = (points[head] - points[tail]).T
+    start[tail], triangle[tail] = np.arctan2(y, x), rim // 3
     return start, triangle
 
 
-@kernel
 def _expected_points(points: Points, triangles: Ids, size: Points) -> float:
     """Area over the square of the local size."""
-    total = 0.0
-    for t in range(len(triangles)):
-        a, b, c = triangles[t]
-        area = 0.5 * (
-            (points[b, 0] - points[a, 0]) * (points[c, 1] - points[a, 1])
-            - (points[b, 1] - points[a, 1]) * (points[c, 0] - points[a, 0])
-        )
-        s = (size[a] + size[b] + size[c]) / 3.0
-        total += area / (s * s)
-    return total
+    a, b, c = (points[corner] for corner in triangles.T)
+    (bx, by), (cx, cy) = (b - a).T, (c - a).T
+    return float((0.5 * (bx * cy - by * cx) / size[triangles].mean(axis=1) ** 2).sum())
 
 
 @kernel

@@ -123,13 +123,10 @@ def _point(points: Floats, at: float) -> tuple[float, float]:
     )
 
 
-@kernel
 def points_at(points: Floats, at: Floats) -> Floats:
     """Points of the curves at fractional indices."""
-    found = np.empty((len(at), 2))
-    for k in range(len(at)):
-        found[k, 0], found[k, 1] = _point(points, at[k])
-    return found
+    i = np.minimum(at.astype(np.int64), len(points) - 2)
+    return np.asarray(points[i] + (at - i)[:, None] * (points[i + 1] - points[i]))
 
 
 @kernel

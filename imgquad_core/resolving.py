@@ -16,7 +16,6 @@ from imgquad_core.areas import restore_areas
 from imgquad_core.clearance import SHARP, snapped
 from imgquad_core.curves import Curves, Ends, Flags, Floats, Ints, per_point, pin_ends
 from imgquad_core.errors import TopologyError
-from imgquad_core.jit import kernel
 from imgquad_core.model import BoundaryGraph
 from imgquad_core.placement import even_out, place_nodes, points_at
 from imgquad_core.polylines import Level, Nodes, any_of_chain, level_of, mark_conflicts, number_nodes
@@ -116,21 +115,19 @@ def _withdraw_ends(draft: Draft, withdrawn: Floats) -> Floats:
     return draft.node + share[:, None] * (draft.ends.place - draft.node)
 
 
-@kernel
 def _mark_dense(
     marks: NDArray[np.uint8], level: Level, offsets: Ints, withdraw: bool, factor: Floats, pull: Floats
 ) -> None:
     """For the dense points under marked segments: how much closer nodes go, and how much nearer to the pixels."""
-    for k in range(len(marks)):
-        if marks[k] == 0:
-            continue
-        c = level.chain[k]
-        low = max(int(level.at[k + c]) - 1, offsets[c])
-        high = min(int(level.at[k + c + 1]) + 2, offsets[c + 1] - 1)
-        for i in range(low, high + 1):
-            factor[i] = min(factor[i], _LESS_CLOSE if marks[k] == SHARP else _CLOSER)
-            if withdraw or marks[k] == SHARP:
-                pull[i] = 1.0 / 3.0
+    k = np.flatnonzero(marks)
+    c = level.chain[k]
+    low = np.maximum(level.at[k + c].astype(np.int64) - 1, offsets[c])
+    high = np.minimum(level.at[k + c + 1].astype(np.int64) + 2, offsets[c + 1] - 1)
+    number = high - low + 1
+    under = np.arange(number.sum()) + np.repeat(low - np.cumsum(number) + number, number)
+    sharp = np.repeat(marks[k] == SHARP, number)
+    np.minimum.at(factor, under, np.where(sharp, _LESS_CLOSE, _CLOSER))
+    pull[under[sharp | withdraw]] = 1.0 / 3.0
 
 
 def _with_neighbours(ends: Ints, chains: Flags, n_nodes: int) -> Flags:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .cutting import CutMesh
 from .frontal import wanted_quads
 from .jit import kernel
-from .triangulation import Constraints
+from .triangulation import Constraints, find_edges
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -174,14 +174,10 @@ def _split_quads(points: Points, quads: Ids, twins: Ids, middle: Ids) -> tuple[P
     return new_points[:count].copy(), new_quads, origin[:count].copy()
 
 
-@kernel
 def middles_of(quads: Ids, twins: Ids, origin: Ids, table: Constraints) -> Ids:
     """Look up the boundary point between the ends of each rim half-edge; -1 inside."""
     middle = np.full(twins.size, -1, np.int64)
-    for h in range(twins.size):
-        if twins[h] < 0:
-            tail, head = origin[quads[h >> 2, h & 3]], origin[quads[h >> 2, (h + 1) & 3]]
-            for i in range(table.offsets[tail], table.offsets[tail + 1]):
-                if table.head[i] == head:
-                    middle[h] = table.middle[i]
+    rim = np.flatnonzero(twins < 0)
+    place = find_edges(table, origin[quads[rim >> 2, rim & 3]], origin[quads[rim >> 2, (rim + 1) & 3]])
+    middle[rim[place >= 0]] = table.middle[place[place >= 0]]
     return middle

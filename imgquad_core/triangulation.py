@@ -49,6 +49,18 @@ def constraint_table(n_points: int, tail: Ids, head: Ids, left: Ids, right: Ids,
     )
 
 
+def find_edges(table: Constraints, tail: Ids, head: Ids) -> Ids:
+    """Return the place of each directed edge ``tail -> head`` in the table, -1 where it has none."""
+    place = np.full(len(tail), -1, np.int64)
+    todo = np.flatnonzero(tail < len(table.offsets) - 1)
+    for step in range(int(np.diff(table.offsets).max(initial=0))):
+        todo = todo[table.offsets[tail[todo]] + step < table.offsets[tail[todo] + 1]]
+        at = table.offsets[tail[todo]] + step
+        same = table.head[at] == head[todo]
+        place[todo[same]] = at[same]
+    return place
+
+
 def triangulate(points: Points, segments: Ids, max_area: float | None = None) -> Triangles:
     """Triangulate `points` with `segments` as constraints, refined inside to `max_area` if given.
 
