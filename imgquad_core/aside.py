@@ -47,24 +47,14 @@ def wait() -> None:
 
 
 def compile_last_stages() -> None:
-    """Compile how triangles become quads, which the first process needs first, and how quads are optimised."""
-    from .composing import compose
-    from .crossfield import cross_field
-    from .cutting import CutMesh
+    """Compile the optimisation of quads, by using it on one."""
     from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
     from .repair import repair
     from .sliding import slide
-    from .splitting import FaceQuads, split_composed, split_quads
+    from .splitting import FaceQuads, split_quads
     from .topology import CleanUp, clean_up
 
-    #   3---2   two triangles, and the quad of both
-    #   | / |
-    #   0---1
     points, ids = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.arange(4)
-    triangles, twins = np.array([[0, 1, 2], [0, 2, 3]]), np.array([-1, -1, 3, 2, -1, -1])
-    cut = CutMesh(points, triangles, twins, np.zeros(2, np.int64), ids, np.ones(4, bool), np.ones(4), np.full(6, -1))
-    cross_field(cut, np.ones(4), 0.3)
-    split_composed(cut, compose(cut), 4)
     mesh = FaceQuads(points, ids[None, :].copy(), np.zeros(1, np.int64), ids, np.ones(4, np.int64))
     split_quads(mesh, np.full(4, -1), np.full(4, -1))
     clean_up(mesh, CleanUp((1,), 0.0, 0.0))

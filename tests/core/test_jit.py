@@ -55,11 +55,10 @@ def test_the_share_on_disk_is_a_share() -> None:
 
 
 ASIDE = """
-from imgquad_core import aside, composing, crossfield, relaxation, repair, sliding, splitting, topology
-from imgquad_core import mesh_image, MeshOptions
+from imgquad_core import aside, mesh_image, MeshOptions, relaxation, repair, sliding, splitting, topology
 import numpy as np
 aside.compile_last_stages()
-modules = (composing, crossfield, relaxation, repair, sliding, splitting, topology)
+modules = (relaxation, repair, sliding, splitting, topology)
 kernels = [k for m in modules for k in vars(m).values() if hasattr(k, "signatures")]
 before = {id(k): len(k.signatures) for k in kernels}
 labels = np.zeros((40, 60), np.int32)
