@@ -92,12 +92,25 @@ def _flood_regions(twins: Ids, left: Ids) -> tuple[Ids, Ids]:
     return region[face], np.concatenate([region[at[bad]], left[told[bad]]])
 
 
+@kernel
 def _compress(triangles: Ids, twins: Ids, middle: Ids, keep: NDArray[np.bool_]) -> tuple[Ids, Ids, Ids]:
     """Keep some triangles and renumber their twins."""
-    kept = np.flatnonzero(keep)
-    new = np.full(twins.size + 1, -1, np.int64)  # the last one for the rim, twin -1
-    new[:-1].reshape(-1, 3)[kept] = np.arange(3 * len(kept)).reshape(-1, 3)
-    return triangles[kept], new[twins.reshape(-1, 3)[kept]].ravel(), middle.reshape(-1, 3)[kept].ravel()
+    new = np.full(len(triangles), -1, np.int64)
+    n = 0
+    for t in range(len(triangles)):
+        if keep[t]:
+            new[t] = n
+            n += 1
+    kept, kept_twins, kept_middle = np.empty((n, 3), np.int64), np.full(3 * n, -1, np.int64), np.empty(3 * n, np.int64)
+    for t in range(len(triangles)):
+        if keep[t]:
+            for k in range(3):
+                kept[new[t], k] = triangles[t, k]
+                kept_middle[3 * new[t] + k] = middle[3 * t + k]
+                h = twins[3 * t + k]
+                if h >= 0 and keep[h // 3]:
+                    kept_twins[3 * new[t] + k] = 3 * new[h // 3] + h % 3
+    return kept, kept_twins, kept_middle
 
 
 @verb

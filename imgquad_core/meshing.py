@@ -332,9 +332,17 @@ def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int, only: Fla
 
 
 def _without_poor(part: FaceQuads) -> FaceQuads:
-    """Replace the worst quads and smooth what is new."""
-    better, beside = repair(part, POOR)
-    return _relaxed(better, 3, 6, beside) if beside.any() else part
+    """Replace the worst quads of the faces that have some, and smooth what is new."""
+    first = part.face.min()
+    local = part._replace(face=part.face - first)
+    poor = worst_of_faces(local.points, local.quads, local.face, int(local.face.max()) + 1) < POOR
+    if not poor.any():
+        return part
+    better, beside = repair(faces_only(local, poor), POOR)
+    if not beside.any():
+        return part
+    whole = joined([faces_only(local, ~poor), _relaxed(better, 3, 6, beside)])
+    return whole._replace(face=whole.face + first)
 
 
 def _faces_beside(graph: BoundaryGraph, chains: Flags) -> Flags:

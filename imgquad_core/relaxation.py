@@ -263,15 +263,17 @@ def _reach_of(points: Points, rings: Rings, v: int) -> tuple[float, float]:
 @kernel
 def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float) -> int:
     """Raise the worst scaled Jacobian of rings below `bad` by a pattern search, in place; return the rings left bad."""
-    left = 0
+    todo, low = free.copy(), np.zeros(len(points), np.bool_)
     for _ in range(rounds):
-        left = 0
+        moved = False
         for v in range(len(points)):
-            if not free[v] or rings.offsets[v] == rings.offsets[v + 1]:
+            if not (todo[v] and free[v]) or rings.offsets[v] == rings.offsets[v + 1]:
                 continue
+            todo[v], low[v] = False, False
             if is_ring_above(points, rings, v, bad):
                 continue
-            best = ring_quality(points, rings, v)
+            before = ring_quality(points, rings, v)
+            best = before
             shortest, longest = _reach_of(points, rings, v)
             room, step = min(shortest, SHORT * longest), 0.3 * longest
             for _ in range(8):
@@ -286,10 +288,15 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
                 points[v, 0], points[v, 1] = best_x, best_y
                 if best_x == x and best_y == y:
                     step *= 0.5
-            if best < bad:
-                left += 1
-        if left == 0:
+            low[v] = best < bad
+            if best > before:
+                _activate_ring(todo, rings, v)
+                moved = True
+        if not moved:
             break
+    left = 0
+    for v in range(len(points)):
+        left += low[v]
     return left
 
 
