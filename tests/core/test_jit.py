@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from imgquad_core.jit import inlined, kernel, share_on_disk, verb
-from imgquad_core.meshing import mesh_boundaries  # noqa: F401  (imports kernels)
+from imgquad_core.jit import inlined, kernel, verb
 
 
 @verb
@@ -50,8 +51,13 @@ def test_written_numbers_do_not_compile_a_kernel_again() -> None:
     assert len(add.signatures) == 1
 
 
-def test_the_share_on_disk_is_a_share() -> None:
-    assert 0.0 <= share_on_disk() <= 1.0
+SHARE = "import imgquad_core.pipeline; from imgquad_core.jit import share_on_disk; print(share_on_disk())"
+
+
+def test_nothing_is_on_disk_at_the_first_start(tmp_path: Path) -> None:
+    fresh = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", SHARE], capture_output=True, text=True, check=True, env=fresh)
+    assert float(done.stdout) == 0.0
 
 
 ASIDE = """
@@ -67,12 +73,14 @@ mesh_image(labels, MeshOptions(size=2.0))
 print(sorted(k.__name__ for k in kernels if before[id(k)] and len(k.signatures) > before[id(k)]))
 names = ("_clean_pass", "_repair_pass", "newton", "slide")
 print(sorted(k.__name__ for k in kernels if before[id(k)] and k.__name__ in names))
+from imgquad_core.jit import share_on_disk
+print(share_on_disk() > aside.FIRST_START)
 """
 
 
 def test_the_second_process_compiles_what_the_first_one_calls() -> None:
     done = subprocess.run([sys.executable, "-c", ASIDE], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == ["[]", "['_clean_pass', '_repair_pass', 'newton', 'slide']"]
+    assert done.stdout.splitlines() == ["[]", "['_clean_pass', '_repair_pass', 'newton', 'slide']", "True"]
 
 
 def test_arrays_that_may_be_read_only_compile_no_kernel_again() -> None:
