@@ -23,7 +23,7 @@ TILE = 8  # edge lengths; quads of a batch are numbered tile by tile
 
 def in_batches(mesh: FaceQuads, work: Callable[[FaceQuads], Result], threads: int) -> list[Result]:
     """Call `work` for groups of whole faces; the results come in the order of the batches, whatever the threads."""
-    return in_threads(_batches(mesh), work, threads)
+    return in_threads(batches_of(mesh), work, threads)
 
 
 def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) -> list[Result]:
@@ -34,15 +34,17 @@ def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) 
         return list(pool.map(work, parts))
 
 
-def _batches(mesh: FaceQuads) -> list[FaceQuads]:
+def batches_of(mesh: FaceQuads) -> list[FaceQuads]:
     """Cut the mesh into groups of neighbouring faces (by number) of about `BATCH` quads."""
+    if len(mesh.quads) == 0:
+        return []
     per_face = np.bincount(mesh.face)
     batch_of_face = (np.cumsum(per_face) - per_face) // BATCH
     batch = batch_of_face[mesh.face]
     order = np.lexsort((_tile(mesh), mesh.face, batch))
     ends = np.flatnonzero(np.diff(batch[order])) + 1
     new = np.full(len(mesh.points), -1, np.int64)  # one for all parts: they share no point
-    return [_part(mesh, chosen, new) for chosen in np.split(order, ends)]
+    return [taken_out(mesh, chosen, new)[0] for chosen in np.split(order, ends)]
 
 
 def _tile(mesh: FaceQuads) -> Ids:
@@ -53,11 +55,14 @@ def _tile(mesh: FaceQuads) -> Ids:
     return np.asarray(cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0])
 
 
-def _part(mesh: FaceQuads, quads: Ids, new: Ids) -> FaceQuads:
-    """Take some quads out, with their points numbered by first use; `new` holds -1 for each of these."""
+def taken_out(mesh: FaceQuads, quads: Ids, new: Ids) -> tuple[FaceQuads, Ids]:
+    """Take some quads out, with their points numbered by first use; return also the old ids of these.
+
+    `new` holds -1 for each of these points; their new numbers are written there.
+    """
     local = mesh.quads[quads]
     ids = _renumber(local, new)
-    return FaceQuads(mesh.points[ids], local, mesh.face[quads], mesh.origin[ids], mesh.wanted[ids])
+    return FaceQuads(mesh.points[ids], local, mesh.face[quads], mesh.origin[ids], mesh.wanted[ids]), ids
 
 
 @kernel
@@ -91,7 +96,7 @@ def joined(parts: list[FaceQuads]) -> FaceQuads:
 def faces_only(mesh: FaceQuads, faces: NDArray[np.bool_]) -> FaceQuads:
     """Keep the quads of the flagged faces."""
     keep = np.flatnonzero(faces[mesh.face])
-    return mesh if len(keep) == len(mesh.face) else _part(mesh, keep, np.full(len(mesh.points), -1, np.int64))
+    return mesh if len(keep) == len(mesh.face) else taken_out(mesh, keep, np.full(len(mesh.points), -1, np.int64))[0]
 
 
 def no_quads() -> FaceQuads:

@@ -8,7 +8,7 @@ level finer, and the better mesh is kept.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import aside
-from .batches import faces_only, in_batches, in_threads, joined, no_quads
+from .batches import batches_of, faces_only, in_batches, in_threads, joined, no_quads
 from .composing import compose
 from .crossfield import cross_field
 from .cutting import CutMesh, FaceConflict, cut_at_constraints
@@ -41,6 +41,7 @@ from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_an
 from .repair import repair
 from .sliding import slide
 from .splitting import INNER_VALENCE, FaceQuads, middles_of, split_composed, split_quads
+from .strips import LARGEST, around_seams, in_strips, nodes_around, seams_between, strips_of
 from .topology import CleanUp, clean_up
 from .triangulation import Triangles, constraint_table, triangulate
 
@@ -51,6 +52,8 @@ STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
+DRAFT, LAST, REPAIRED = (3, 0), (8, 6), (3, 6)  # sweeps of Laplace and Newton before and after the last split, ...
+RETRIED = 6  # quads beside a seam within which the clean-up looks again
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
 POOR = 0.7  # scaled Jacobian below which single quads are replaced
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
@@ -267,16 +270,52 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
     nothing = np.zeros(len(edges.tail), np.int64)
     middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)
 
-    def finish(part: FaceQuads) -> FaceQuads:
-        part = clean_up(_relaxed(_fitted(part, graph.points, False), 3, 0), how)
-        if stride == 4:
-            part = _relaxed(part, 3, 0)
-            twins = twins_of(part.quads, len(part.points))
-            part = split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
-        return _without_poor(_relaxed(_fitted(part, graph.points, True), 8, 6))
+    def halve(part: FaceQuads) -> FaceQuads:
+        twins = twins_of(part.quads, len(part.points))
+        return split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
 
-    quads = joined(in_batches(composed, finish, options.threads))
+    def finish(part: FaceQuads) -> FaceQuads:
+        part = clean_up(_relaxed(_fitted(part, graph.points, False), *DRAFT), how)
+        if stride == 4:
+            part = halve(_relaxed(part, *DRAFT))
+        return _without_poor(_relaxed(_fitted(part, graph.points, True), *LAST))
+
+    def finish_large(part: FaceQuads) -> FaceQuads:
+        part = _cleaned_in_strips(_fitted(part, graph.points, False), how, options.threads)
+        if stride == 4:
+            part = halve(part)
+        return _polished_in_strips(_fitted(part, graph.points, True), options.threads)
+
+    large = np.bincount(composed.face, minlength=len(faces)) > LARGEST
+    small = in_batches(faces_only(composed, ~large), finish, options.threads)
+    single = map(finish_large, batches_of(faces_only(composed, large)))
+    quads = joined([*small, *single])
     return _Level(quads, faces, worst_of_faces(quads.points, quads.quads, quads.face, len(faces)))
+
+
+def _cleaned_in_strips(face: FaceQuads, how: CleanUp, threads: int) -> FaceQuads:
+    """Smooth and clean up one large face in strips, then in others around the seams of the first ones."""
+    first, seams = in_strips(
+        face, strips_of(face.points, face.quads), lambda part, _: clean_up(_relaxed(part, *DRAFT), how), threads
+    )
+    beside = nodes_around(first.quads, seams, RETRIED)
+
+    def again(part: FaceQuads, nodes: Ids) -> FaceQuads:
+        near = beside[nodes]
+        return _relaxed(clean_up(_relaxed(part, *DRAFT, near), how, near), *DRAFT)
+
+    second, seams = in_strips(first, strips_of(first.points, first.quads, True), again, threads)
+    return around_seams(second, seams, lambda part: _relaxed(part, *DRAFT))
+
+
+def _polished_in_strips(face: FaceQuads, threads: int) -> FaceQuads:
+    """Smooth one large face in strips and replace its worst quads, then do the same around the seams."""
+
+    def polish(part: FaceQuads) -> FaceQuads:
+        return _without_poor(_relaxed(part, *LAST))
+
+    polished, seams = in_strips(face, strips_of(face.points, face.quads), lambda part, _: polish(part), threads)
+    return around_seams(polished, seams, polish)
 
 
 def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
@@ -341,7 +380,7 @@ def _without_poor(part: FaceQuads) -> FaceQuads:
     better, beside = repair(faces_only(local, poor), POOR)
     if not beside.any():
         return part
-    whole = joined([faces_only(local, ~poor), _relaxed(better, 3, 6, beside)])
+    whole = joined([faces_only(local, ~poor), _relaxed(better, *REPAIRED, beside)])
     return whole._replace(face=whole.face + first)
 
 
@@ -376,22 +415,36 @@ def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) 
 def _slid(mesh: QuadMesh, rounds: int, threads: int) -> QuadMesh:
     """Let boundary nodes slide, and the nodes inside follow."""
     points, gone = mesh.points.copy(), np.zeros(mesh.n_points)
-    rings, groups = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads)
+    rings, (groups, seams) = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads)
+
+    def move(how: Callable[[Flags], object]) -> None:
+        in_threads(groups, how, threads)
+        how(seams)
+
     for _ in range(rounds):
         slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
-        in_threads(groups, lambda free: newton(points, rings, free, 2, GOOD), threads)
-    in_threads(groups, lambda free: untangle(points, rings, free, 4, FAIR), threads)
+        move(lambda free: newton(points, rings, free, 2, GOOD))
+    move(lambda free: untangle(points, rings, free, 4, FAIR))
     return replace(mesh, points=points)
 
 
-def _inner_nodes(mesh: QuadMesh, n_groups: int) -> list[Flags]:
-    """Return the nodes inside faces in groups of whole faces: those of one do not feel those of another."""
-    share = np.bincount(mesh.quad_region, minlength=len(mesh.region_label)) / mesh.n_quads
-    group_of_face = np.floor((np.cumsum(share) - 0.5 * share) * n_groups)
-    group = np.zeros(mesh.n_points)
-    group[mesh.quads] = group_of_face[mesh.quad_region][:, None]
+def _inner_nodes(mesh: QuadMesh, n_groups: int) -> tuple[list[Flags], Flags]:
+    """Return the nodes inside faces in groups that do not feel each other, and those between them.
+
+    A group has whole faces or strips of large ones, whatever the number of groups.
+    """
+    strip = np.zeros(mesh.n_quads, np.int64)
+    for face in np.flatnonzero(np.bincount(mesh.quad_region) > 4 * LARGEST):
+        quads = np.flatnonzero(mesh.quad_region == face)
+        strip[quads] = strips_of(mesh.points, mesh.quads[quads])
+    _, piece, size = np.unique(mesh.quad_region * (strip.max() + 1) + strip, return_inverse=True, return_counts=True)
+    share = size / mesh.n_quads
+    group_of_piece = np.floor((np.cumsum(share) - 0.5 * share) * n_groups)
     inner = mesh.point_kind == PointKind.INTERIOR
-    return [inner & (group == g) for g in range(n_groups)]
+    seams = inner & seams_between(piece, mesh.quads, mesh.n_points)
+    group = np.zeros(mesh.n_points)
+    group[mesh.quads] = group_of_piece[piece][:, None]
+    return [inner & ~seams & (group == g) for g in range(n_groups)], seams
 
 
 def _materials_of(labels: NDArray[np.int32]) -> Materials:

@@ -27,6 +27,7 @@ from .cavity import (
     compact,
     insert,
     net_of,
+    padded,
     penalty,
     push_all,
     push_side,
@@ -41,6 +42,7 @@ from .splitting import FaceQuads
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 TRIAL_SWEEPS = 5
 SMALLEST_SHARE, LARGEST_SHARE = 0.15, 4.0  # of a new quad's area in the mean of the cavity
@@ -58,7 +60,7 @@ class CleanUp(NamedTuple):
     thorough: int = 40  #: larger cavities begin at nodes with too many quads only: half the time, .05 % more irregular
 
 
-def clean_up(mesh: FaceQuads, how: CleanUp) -> FaceQuads:
+def clean_up(mesh: FaceQuads, how: CleanUp, seeds: Flags | None = None) -> FaceQuads:
     """Remesh cavities around irregular nodes.
 
     Parameters
@@ -67,6 +69,8 @@ def clean_up(mesh: FaceQuads, how: CleanUp) -> FaceQuads:
         A valid mesh: counter-clockwise, convex.
     how : CleanUp
         Sizes of cavities and acceptance.
+    seeds : bool, shape (n_points,), optional
+        Nodes around which to look, of those that are there now. By default all.
 
     Returns
     -------
@@ -78,8 +82,9 @@ def clean_up(mesh: FaceQuads, how: CleanUp) -> FaceQuads:
     largest = max(how.sizes)
     net = net_of(mesh, largest)
     cavity, canvas = scratch(net, largest)
+    begins = padded(np.ones(len(mesh.points), bool) if seeds is None else seeds, len(net.valence), True)
     for size in how.sizes:
-        _clean_pass(net, cavity, canvas, size, how.tolerance, how.worst, size > how.thorough)
+        _clean_pass(net, cavity, canvas, begins, size, how.tolerance, how.worst, size > how.thorough)
     return compact(net, mesh)
 
 
@@ -164,14 +169,21 @@ def _choose(net: Net, cavity: Cavity, cut: Ids, last_gain: int, last_size: int) 
 
 @kernel
 def _clean_pass(
-    net: Net, cavity: Cavity, canvas: Canvas, largest: int, tolerance: float, worst: float, crowded_only: bool
+    net: Net,
+    cavity: Cavity,
+    canvas: Canvas,
+    begins: Flags,
+    largest: int,
+    tolerance: float,
+    worst: float,
+    crowded_only: bool,
 ) -> int:
-    """Try a cavity of up to `largest` quads around each irregular node; return how many were remeshed."""
+    """Try a cavity of up to `largest` quads around each irregular node that `begins` one; return how many succeed."""
     cut = np.zeros(5, np.int64)
     new_id = np.empty(canvas.quads.shape[0], np.int64)
     done = 0
     for v in range(len(net.valence)):
-        if net.valence[v] == 0 or net.valence[v] == net.wanted[v]:
+        if not begins[v] or net.valence[v] == 0 or net.valence[v] == net.wanted[v]:
             continue
         if crowded_only and net.valence[v] < net.wanted[v]:
             continue
