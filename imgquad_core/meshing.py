@@ -36,12 +36,24 @@ from .outline import (
     wide_faces,
     with_short_chains_halved,
 )
+from .pieces import LARGEST, LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
 from .quality import scaled_jacobian
-from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
+from .relaxation import (
+    BAD,
+    GOOD,
+    Rings,
+    fit_rim,
+    laplace,
+    newton,
+    nodes_of_poor,
+    rings_of,
+    sector_angles,
+    untangle,
+    worst_of_faces,
+)
 from .repair import repair
 from .sliding import slide
 from .splitting import INNER_VALENCE, FaceQuads, middles_of, split_composed, split_quads
-from .strips import LARGEST, around_seams, in_strips, nodes_around, seams_between, strips_of
 from .topology import CleanUp, clean_up
 from .triangulation import Triangles, constraint_table, triangulate
 
@@ -53,7 +65,9 @@ LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 FIT_ROUNDS = 6
 DRAFT, LAST, REPAIRED = (3, 0), (8, 6), (3, 6)  # sweeps of Laplace and Newton before and after the last split, ...
-RETRIED = 6  # quads beside a seam within which the clean-up looks again
+RETRIED = 6  # quads beside a seam within which the clean-up of a large face looks again
+ROOM = 10  # quads around a place that its cavities can reach
+REACH = 3  # quads beside a seam that are smoothed again
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
 POOR = 0.7  # scaled Jacobian below which single quads are replaced
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
@@ -281,41 +295,37 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
         return _without_poor(_relaxed(_fitted(part, graph.points, True), *LAST))
 
     def finish_large(part: FaceQuads) -> FaceQuads:
-        part = _cleaned_in_strips(_fitted(part, graph.points, False), how, options.threads)
+        threads = options.threads
+        part = _cleaned_in_pieces(_fitted(part, graph.points, False), how, threads)
         if stride == 4:
-            part = halve(part)
-        return _polished_in_strips(_fitted(part, graph.points, True), options.threads)
+            part = halve(_relaxed_in_pieces(part, *DRAFT, threads))
+        return _relaxed_in_pieces(_fitted(part, graph.points, True), *LAST, threads)
 
     large = np.bincount(composed.face, minlength=len(faces)) > LARGEST
     small = in_batches(faces_only(composed, ~large), finish, options.threads)
-    single = map(finish_large, batches_of(faces_only(composed, large)))
-    quads = joined([*small, *single])
+    single = list(map(finish_large, batches_of(faces_only(composed, large))))
+    quads = joined([*small, *in_threads(single, _without_poor, options.threads)])
     return _Level(quads, faces, worst_of_faces(quads.points, quads.quads, quads.face, len(faces)))
 
 
-def _cleaned_in_strips(face: FaceQuads, how: CleanUp, threads: int) -> FaceQuads:
-    """Smooth and clean up one large face in strips, then in others around the seams of the first ones."""
-    first, seams = in_strips(
-        face, strips_of(face.points, face.quads), lambda part, _: clean_up(_relaxed(part, *DRAFT), how), threads
-    )
-    beside = nodes_around(first.quads, seams, RETRIED)
-
-    def again(part: FaceQuads, nodes: Ids) -> FaceQuads:
-        near = beside[nodes]
-        return _relaxed(clean_up(_relaxed(part, *DRAFT, near), how, near), *DRAFT)
-
-    second, seams = in_strips(first, strips_of(first.points, first.quads, True), again, threads)
-    return around_seams(second, seams, lambda part: _relaxed(part, *DRAFT))
+def _cleaned_in_pieces(face: FaceQuads, how: CleanUp, threads: int) -> FaceQuads:
+    """Smooth and clean up one large face in strips, then in bands around the seams."""
+    strip = strips_of(face.points, face.quads)
+    face, seams = in_pieces(face, strip, lambda part, _: clean_up(_relaxed(part, *DRAFT), how), threads)
+    near = nodes_around(face.quads, seams, RETRIED)
+    in_band = nodes_around(face.quads, near, ROOM)[face.quads].any(axis=1)
+    band = np.where(in_band, strips_of(face.points, face.quads, True), LEFT_ALONE)
+    return in_pieces(face, band, lambda part, ids: clean_up(_relaxed(part, *DRAFT), how, near[ids]), threads)[0]
 
 
-def _polished_in_strips(face: FaceQuads, threads: int) -> FaceQuads:
-    """Smooth one large face in strips and replace its worst quads, then do the same around the seams."""
-
-    def polish(part: FaceQuads) -> FaceQuads:
-        return _without_poor(_relaxed(part, *LAST))
-
-    polished, seams = in_strips(face, strips_of(face.points, face.quads), lambda part, _: polish(part), threads)
-    return around_seams(polished, seams, polish)
+def _relaxed_in_pieces(face: FaceQuads, laplace_sweeps: int, newton_sweeps: int, threads: int) -> FaceQuads:
+    """Smooth the nodes inside one large face in strips, then those around the seams."""
+    points, rings, free = face.points.copy(), rings_of(face.quads, len(face.points)), face.origin < 0
+    groups, seams = independent_nodes(strips_of(points, face.quads), face.quads, len(points), threads)
+    near = nodes_around(face.quads, seams, REACH)
+    in_threads(groups, lambda nodes: _relax(points, rings, free & nodes, laplace_sweeps, newton_sweeps), threads)
+    _relax(points, rings, free & near, laplace_sweeps, newton_sweeps)
+    return face._replace(points=points)
 
 
 def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
@@ -363,25 +373,29 @@ def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int, only: Fla
     points, free = part.points.copy(), part.origin < 0
     if only is not None:
         free &= only
-    rings = rings_of(part.quads, len(points))
-    laplace(points, rings, free, laplace_sweeps)
-    untangle(points, rings, free, 2, BAD)
-    newton(points, rings, free, newton_sweeps, GOOD)
+    _relax(points, rings_of(part.quads, len(points)), free, laplace_sweeps, newton_sweeps)
     return part._replace(points=points)
 
 
+def _relax(points: Points, rings: Rings, free: Flags, laplace_sweeps: int, newton_sweeps: int) -> None:
+    """Smooth free nodes, in place."""
+    laplace(points, rings, free, laplace_sweeps)
+    untangle(points, rings, free, 2, BAD)
+    newton(points, rings, free, newton_sweeps, GOOD)
+
+
 def _without_poor(part: FaceQuads) -> FaceQuads:
-    """Replace the worst quads of the faces that have some, and smooth what is new."""
-    first = part.face.min()
-    local = part._replace(face=part.face - first)
-    poor = worst_of_faces(local.points, local.quads, local.face, int(local.face.max()) + 1) < POOR
+    """Replace the worst quads, and smooth what is new."""
+    poor = nodes_of_poor(part.points, part.quads, POOR)
     if not poor.any():
         return part
-    better, beside = repair(faces_only(local, poor), POOR)
-    if not beside.any():
-        return part
-    whole = joined([faces_only(local, ~poor), _relaxed(better, *REPAIRED, beside)])
-    return whole._replace(face=whole.face + first)
+    near = nodes_around(part.quads, poor, ROOM)[part.quads].any(axis=1)
+    return in_pieces(part, np.where(near, 0, LEFT_ALONE), lambda piece, _: _repaired(piece), 1)[0]
+
+
+def _repaired(part: FaceQuads) -> FaceQuads:
+    better, beside = repair(part, POOR)
+    return _relaxed(better, *REPAIRED, beside)
 
 
 def _faces_beside(graph: BoundaryGraph, chains: Flags) -> Flags:
@@ -433,18 +447,15 @@ def _inner_nodes(mesh: QuadMesh, n_groups: int) -> tuple[list[Flags], Flags]:
 
     A group has whole faces or strips of large ones, whatever the number of groups.
     """
-    strip = np.zeros(mesh.n_quads, np.int64)
+    strip, n_strips = np.zeros(mesh.n_quads, np.int64), np.ones(len(mesh.region_label), np.int64)
     for face in np.flatnonzero(np.bincount(mesh.quad_region) > 4 * LARGEST):
         quads = np.flatnonzero(mesh.quad_region == face)
         strip[quads] = strips_of(mesh.points, mesh.quads[quads])
-    _, piece, size = np.unique(mesh.quad_region * (strip.max() + 1) + strip, return_inverse=True, return_counts=True)
-    share = size / mesh.n_quads
-    group_of_piece = np.floor((np.cumsum(share) - 0.5 * share) * n_groups)
+        n_strips[face] = strip[quads].max() + 1
+    piece = (np.cumsum(n_strips) - n_strips)[mesh.quad_region] + strip
+    groups, seams = independent_nodes(piece, mesh.quads, mesh.n_points, n_groups)
     inner = mesh.point_kind == PointKind.INTERIOR
-    seams = inner & seams_between(piece, mesh.quads, mesh.n_points)
-    group = np.zeros(mesh.n_points)
-    group[mesh.quads] = group_of_piece[piece][:, None]
-    return [inner & ~seams & (group == g) for g in range(n_groups)], seams
+    return [inner & group for group in groups], inner & seams
 
 
 def _materials_of(labels: NDArray[np.int32]) -> Materials:

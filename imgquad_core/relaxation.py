@@ -351,6 +351,17 @@ def worst_of_faces(points: Points, quads: Ids, face: Ids, n_faces: int) -> Point
 
 
 @kernel
+def nodes_of_poor(points: Points, quads: Ids, below: float) -> Flags:
+    """Return which nodes have a quad of a scaled Jacobian below `below`."""
+    poor = np.zeros(len(points), np.bool_)
+    for q in range(len(quads)):
+        if quad_quality(points, quads, q) < below:
+            for k in range(4):
+                poor[quads[q, k]] = True
+    return poor
+
+
+@kernel
 def sector_angles(points: Points, quads: Ids) -> Points:
     """Sum of the corner angles at each node: the angle of its sector for a node on the rim."""
     angle = np.zeros(len(points))

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from faces import areas, assert_valid_faces, grid, polygon_graph, quads_of, valences
-from imgquad_core import meshing, strips
+from imgquad_core import meshing, pieces
 from imgquad_core.boundary import extract_boundaries
 from imgquad_core.meshing import MeshingOptions, mesh_boundaries
 from imgquad_core.model import LabelImage
+from imgquad_core.pieces import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
 from imgquad_core.quality import quality_report
 from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.splitting import INNER_VALENCE, FaceQuads
-from imgquad_core.strips import around_seams, in_strips, strips_of
 from imgquad_core.topology import CleanUp, clean_up
 from invariants import assert_valid_mesh
 from shapes import label_image, labels_of_kind, pixel_centres
@@ -27,7 +27,7 @@ Ids = np.ndarray[tuple[int], np.dtype[np.int64]]
 @pytest.fixture
 def face(monkeypatch: pytest.MonkeyPatch) -> FaceQuads:
     """Return a hexagon of unstructured quads, wide enough for some strips of eight quads."""
-    monkeypatch.setattr(strips, "WIDTH", 8)
+    monkeypatch.setattr(pieces, "WIDTH", 8)
     corners = [(60 + 58 * np.cos(a), 60 + 58 * np.sin(a)) for a in np.arange(6) * np.pi / 3]
     return quads_of(polygon_graph(corners, [24] * 6, (120, 120)), 2.4)
 
@@ -65,7 +65,7 @@ def test_a_strip_has_its_seams_as_rim_and_the_sewn_face_is_as_it_was(face: FaceQ
         assert np.array_equal(part.wanted[~complete], valences(part)[~complete])
         return part
 
-    sewn, seams = in_strips(face, cut(face), look, 1)
+    sewn, seams = in_pieces(face, cut(face), look, 1)
     assert seen.min() == 1
     assert corners(sewn) == corners(face)
     assert set(map(tuple, sewn.points[seams].tolist())) == set(map(tuple, face.points[seen > 1].tolist()))
@@ -88,7 +88,7 @@ def test_new_quads_are_sewn_in_and_threads_do_not_change_a_byte(face: FaceQuads,
     def work(part: FaceQuads, _: Ids) -> FaceQuads:
         return clean_up(part, CleanUp((16, 40), 0.2, 0.6))
 
-    (alone, seams), (together, _) = (in_strips(face, cut(face), work, n) for n in (1, threads))
+    (alone, seams), (together, _) = (in_pieces(face, cut(face), work, n) for n in (1, threads))
     assert all(a.tobytes() == b.tobytes() for a, b in zip(alone, together, strict=True))
     assert_valid_faces(alone)
     assert table(alone, "origin").items() >= {k: v for k, v in table(face, "origin").items() if v >= 0}.items()
@@ -110,22 +110,42 @@ def test_two_strips_are_worked_on_at_once(face: FaceQuads) -> None:
             meet.wait()  # breaks unless another thread comes here too
         return part
 
-    in_strips(face, cut(face), work, 2)
+    in_pieces(face, cut(face), work, 2)
 
 
-def test_only_what_is_near_a_seam_is_done_again() -> None:
+def test_what_is_left_alone_stays_as_it_is() -> None:
     mesh = grid(30, 4, 0.2)
-    seams = np.abs(mesh.points[:, 0] - 15.0) < 0.3
+    middle = np.abs(mesh.points[mesh.quads].mean(axis=1)[:, 0] - 15.0) < 2.0
 
-    def flatten(part: FaceQuads) -> FaceQuads:
+    def flatten(part: FaceQuads, _: Ids) -> FaceQuads:
         inner = part.origin < 0
         return part._replace(points=np.where(inner[:, None], np.round(part.points), part.points))
 
-    done = around_seams(mesh, seams, flatten)
+    done, seams = in_pieces(mesh, np.where(middle, 0, LEFT_ALONE), flatten, 1)
     moved = np.array([p not in table(mesh, "origin") for p in map(tuple, done.points.tolist())])
-    assert np.array_equal(np.unique(np.round(done.points[moved, 0])), np.arange(12, 19))
+    assert np.array_equal(np.unique(done.points[moved, 0]), [14, 15, 16])
+    assert np.array_equal(np.unique(np.round(done.points[seams, 0])), [13, 17])
     assert_valid_faces(done)
-    assert around_seams(mesh, np.zeros(len(seams), bool), flatten) is mesh
+
+
+def test_nodes_around_some(face: FaceQuads) -> None:
+    start = np.zeros(len(face.points), bool)
+    start[face.quads[100, 0]] = True
+    once = np.isin(np.arange(len(start)), face.quads[np.isin(face.quads, np.flatnonzero(start)).any(axis=1)])
+    twice = np.isin(np.arange(len(start)), face.quads[np.isin(face.quads, np.flatnonzero(once)).any(axis=1)])
+    for rings, expected in enumerate((start, once, twice)):
+        assert np.array_equal(nodes_around(face.quads, start, rings), expected)
+
+
+@pytest.mark.parametrize("n_groups", [1, 2, 3])
+def test_groups_of_nodes_share_no_quad(face: FaceQuads, n_groups: int) -> None:
+    groups, seams = independent_nodes(cut(face), face.quads, len(face.points), n_groups)
+    assert len(groups) == n_groups
+    assert np.array_equal(sum(group.astype(int) for group in groups) + seams, np.ones(len(seams)))
+    for group in groups:
+        mine = group[face.quads].any(axis=1)
+        assert mine.any()
+        assert (group | seams)[face.quads[mine]].all()
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +163,7 @@ def matrix() -> LabelImage:
     return label_image(labels)
 
 
-def test_a_matrix_in_strips_has_no_scar(matrix: LabelImage, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_matrix_in_pieces_has_no_scar(matrix: LabelImage, monkeypatch: pytest.MonkeyPatch) -> None:
     graph = smooth_boundaries(extract_boundaries(matrix), SmoothingOptions(size=2.0))
     options = MeshingOptions(size=2.0)
     one, two = (mesh_boundaries(graph, replace(options, threads=n)) for n in (1, 2))
@@ -163,7 +183,7 @@ def test_a_matrix_in_strips_has_no_scar(matrix: LabelImage, monkeypatch: pytest.
 @pytest.mark.parametrize("kind", ["noise", "checkerboard", "speckled", "void"])
 def test_narrow_strips_leave_any_picture_valid(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(meshing, "LARGEST", 30)
-    monkeypatch.setattr(strips, "WIDTH", 4)
+    monkeypatch.setattr(pieces, "WIDTH", 4)
     image = label_image(labels_of_kind(kind, 24, 28, 3, 7))
     graph = smooth_boundaries(extract_boundaries(image), SmoothingOptions(size=1.0))
     assert_valid_mesh(mesh_boundaries(graph, MeshingOptions(size=1.0), image.materials), image)
