@@ -153,10 +153,12 @@ def list_removed(before: LabelImage, after: LabelImage) -> tuple[Removal, ...]:
     if before.labels is after.labels:
         return ()
     changed = (before.labels != after.labels).ravel()
-    parent = labelled_clusters(_ranked(before.labels)[1]).parent
+    root = labelled_clusters(_ranked(before.labels)[1]).parent
+    while (root != root[root]).any():
+        root = root[root]
     lost = before.labels.ravel()[changed]
-    # a cluster is recoloured as a whole, so its first pixel stands for it
-    firsts = before.labels.ravel()[changed & (parent == np.arange(len(parent)))]
+    # its first pixel stands for a cluster, even if that is kept: what is recoloured first may part others at a corner
+    firsts = before.labels.ravel()[np.unique(root[changed])]
     materials, pixels = np.unique(lost, return_counts=True)
     return tuple(
         Removal(int(m), before.materials.name_of(int(m)), int(np.count_nonzero(firsts == m)), int(n))

@@ -16,8 +16,9 @@ from .errors import InputError
 from .frontal import wanted_quads
 from .halfedge import corners_at
 from .model import PointKind, QuadMesh
+from .pieces import nodes_around
 from .quality import corner_angles, scaled_jacobian, sectors_of
-from .relaxation import BAD, GOOD, laplace, newton, rings_of, untangle, worst_of_faces
+from .relaxation import BAD, GOOD, laplace, newton, nodes_of_poor, rings_of, untangle, worst_of_faces
 from .splitting import INNER_VALENCE, FaceQuads
 from .topology import CleanUp, clean_up
 
@@ -106,8 +107,22 @@ def _relaxed(part: FaceQuads) -> FaceQuads:
         laplace(points, rings, free, LAPLACE_SWEEPS)
         if untangle(points, rings, free, 2, BAD) == 0:
             break
+        _spread(points, part.quads, free)
     newton(points, rings, free, NEWTON_SWEEPS, GOOD)
     return part._replace(points=points)
+
+
+def _spread(points: NDArray[np.float64], quads: Ids, free: NDArray[np.bool_]) -> None:
+    """Move the nodes around inverted quads between their neighbours, in place, whatever that inverts on the way."""
+    tangled = nodes_of_poor(points, quads, 0.0)
+    near = np.flatnonzero(nodes_around(quads, tangled, 2) & free)
+    ends = np.concatenate([quads[:, [k, (k + step) % 4]] for k in range(4) for step in (1, 3)])
+    ends = ends[np.isin(ends[:, 0], near)]
+    count = np.bincount(ends[:, 0], minlength=len(points))[near]
+    for _ in range(LAPLACE_SWEEPS):
+        for axis in (0, 1):
+            total = np.bincount(ends[:, 0], points[ends[:, 1], axis], len(points))[near]
+            points[near, axis] = total / count
 
 
 def _is_better(old: FaceQuads, new: FaceQuads, n_faces: int) -> NDArray[np.bool_]:

@@ -102,6 +102,7 @@ def test_edges_are_halved_beside_points_that_fold_quads(refits: int, monkeypatch
     graph = boundaries(image, 5.0)
     monkeypatch.setattr(meshing, "WORST", 0.5)  # so that something is worse
     monkeypatch.setattr(meshing, "REFITS", refits)
+    monkeypatch.setattr(meshing, "WISHES", min(meshing.WISHES, refits))
     mesh = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"), image.materials)
     assert_valid_mesh(mesh, image)
     n, edges, finer = len(graph.points), np.diff(graph.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
