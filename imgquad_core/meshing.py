@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import aside
-from .batches import batches_of, faces_only, in_batches, in_threads, joined, no_quads
+from .batches import faces_only, in_threads, joined, no_quads
 from .composing import compose
 from .crossfield import cross_field
 from .cutting import CutMesh, FaceConflict, cut_at_constraints
 from .errors import InputError, TopologyError
-from .frontal import frontal_points, wanted_quads
-from .halfedge import twins_of
+from .finishing import finished
+from .frontal import frontal_points
 from .model import BoundaryGraph, Materials, PointKind, QuadMesh
 from .outline import (
     Flags,
@@ -36,25 +36,12 @@ from .outline import (
     wide_faces,
     with_short_chains_halved,
 )
-from .pieces import LARGEST, LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
+from .pieces import LARGEST, independent_nodes, strips_of
 from .quality import scaled_jacobian
-from .relaxation import (
-    BAD,
-    GOOD,
-    Rings,
-    fit_rim,
-    laplace,
-    newton,
-    nodes_of_poor,
-    rings_of,
-    sector_angles,
-    untangle,
-    worst_of_faces,
-)
-from .repair import repair
+from .relaxation import GOOD, newton, rings_of, untangle, worst_of_faces
 from .sliding import slide
-from .splitting import INNER_VALENCE, FaceQuads, middles_of, split_composed, split_quads
-from .topology import CleanUp, clean_up
+from .splitting import FaceQuads, split_composed
+from .topology import CleanUp
 from .triangulation import Triangles, constraint_table, triangulate
 
 Ids = NDArray[np.int64]
@@ -63,13 +50,7 @@ Points = NDArray[np.float64]
 STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
-FIT_ROUNDS = 6
-DRAFT, LAST, REPAIRED = (3, 0), (8, 6), (3, 6)  # sweeps of Laplace and Newton before and after the last split, ...
-RETRIED = 6  # quads beside a seam within which the clean-up of a large face looks again
-ROOM = 10  # quads around a place that its cavities can reach
-REACH = 3  # quads beside a seam that are smoothed again
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
-POOR = 0.7  # scaled Jacobian below which single quads are replaced
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
 WORST = 0.42  # below it the boundary's edges at the quad are halved, in
 WISHES = 2  # rounds at most; at folded quads in
@@ -283,49 +264,8 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
     edges = coarse_segments(graph, chains_of(graph, faces), 2)
     nothing = np.zeros(len(edges.tail), np.int64)
     middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)
-
-    def halve(part: FaceQuads) -> FaceQuads:
-        twins = twins_of(part.quads, len(part.points))
-        return split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
-
-    def finish(part: FaceQuads) -> FaceQuads:
-        part = clean_up(_relaxed(_fitted(part, graph.points, False), *DRAFT), how)
-        if stride == 4:
-            part = halve(_relaxed(part, *DRAFT))
-        return _without_poor(_relaxed(_fitted(part, graph.points, True), *LAST))
-
-    def finish_large(part: FaceQuads) -> FaceQuads:
-        threads = options.threads
-        part = _cleaned_in_pieces(_fitted(part, graph.points, False), how, threads)
-        if stride == 4:
-            part = halve(_relaxed_in_pieces(part, *DRAFT, threads))
-        return _relaxed_in_pieces(_fitted(part, graph.points, True), *LAST, threads)
-
-    large = np.bincount(composed.face, minlength=len(faces)) > LARGEST
-    small = in_batches(faces_only(composed, ~large), finish, options.threads)
-    single = list(map(finish_large, batches_of(faces_only(composed, large))))
-    quads = joined([*small, *in_threads(single, _without_poor, options.threads)])
+    quads = finished(composed, graph.points, middles if stride == 4 else None, how, options.threads)
     return _Level(quads, faces, worst_of_faces(quads.points, quads.quads, quads.face, len(faces)))
-
-
-def _cleaned_in_pieces(face: FaceQuads, how: CleanUp, threads: int) -> FaceQuads:
-    """Smooth and clean up one large face in strips, then in bands around the seams."""
-    strip = strips_of(face.points, face.quads)
-    face, seams = in_pieces(face, strip, lambda part, _: clean_up(_relaxed(part, *DRAFT), how), threads)
-    near = nodes_around(face.quads, seams, RETRIED)
-    in_band = nodes_around(face.quads, near, ROOM)[face.quads].any(axis=1)
-    band = np.where(in_band, strips_of(face.points, face.quads, True), LEFT_ALONE)
-    return in_pieces(face, band, lambda part, ids: clean_up(_relaxed(part, *DRAFT), how, near[ids]), threads)[0]
-
-
-def _relaxed_in_pieces(face: FaceQuads, laplace_sweeps: int, newton_sweeps: int, threads: int) -> FaceQuads:
-    """Smooth the nodes inside one large face in strips, then those around the seams."""
-    points, rings, free = face.points.copy(), rings_of(face.quads, len(face.points)), face.origin < 0
-    groups, seams = independent_nodes(strips_of(points, face.quads), face.quads, len(points), threads)
-    near = nodes_around(face.quads, seams, REACH)
-    in_threads(groups, lambda nodes: _relax(points, rings, free & nodes, laplace_sweeps, newton_sweeps), threads)
-    _relax(points, rings, free & near, laplace_sweeps, newton_sweeps)
-    return face._replace(points=points)
 
 
 def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
@@ -355,47 +295,6 @@ def _largest_sizes(cut: CutMesh, sizes: Points) -> Points:
     face = np.zeros(len(cut.points), np.int64)
     face[cut.triangles] = cut.face[:, None]
     return sizes[face]
-
-
-def _fitted(part: FaceQuads, targets: Points, whole: bool) -> FaceQuads:
-    """Move the rim to the boundary's points: as far as no quad folds, or all of it, whatever folds."""
-    rim = part.origin >= 0
-    points = part.points.copy()
-    late = fit_rim(points, rings_of(part.quads, len(points)), rim, targets[part.origin], FIT_ROUNDS)
-    if whole:
-        points[late] = targets[part.origin[late]]
-    wanted = np.where(rim, wanted_quads(sector_angles(points, part.quads)), INNER_VALENCE)
-    return part._replace(points=points, wanted=wanted)
-
-
-def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int, only: Flags | None = None) -> FaceQuads:
-    """Smooth the nodes inside faces, all or some."""
-    points, free = part.points.copy(), part.origin < 0
-    if only is not None:
-        free &= only
-    _relax(points, rings_of(part.quads, len(points)), free, laplace_sweeps, newton_sweeps)
-    return part._replace(points=points)
-
-
-def _relax(points: Points, rings: Rings, free: Flags, laplace_sweeps: int, newton_sweeps: int) -> None:
-    """Smooth free nodes, in place."""
-    laplace(points, rings, free, laplace_sweeps)
-    untangle(points, rings, free, 2, BAD)
-    newton(points, rings, free, newton_sweeps, GOOD)
-
-
-def _without_poor(part: FaceQuads) -> FaceQuads:
-    """Replace the worst quads, and smooth what is new."""
-    poor = nodes_of_poor(part.points, part.quads, POOR)
-    if not poor.any():
-        return part
-    near = nodes_around(part.quads, poor, ROOM)[part.quads].any(axis=1)
-    return in_pieces(part, np.where(near, 0, LEFT_ALONE), lambda piece, _: _repaired(piece), 1)[0]
-
-
-def _repaired(part: FaceQuads) -> FaceQuads:
-    better, beside = repair(part, POOR)
-    return _relaxed(better, *REPAIRED, beside)
 
 
 def _faces_beside(graph: BoundaryGraph, chains: Flags) -> Flags:
