@@ -103,11 +103,12 @@ def _relaxed(part: FaceQuads) -> FaceQuads:
     """Smooth the nodes inside faces."""
     points, free = part.points.copy(), part.origin < 0
     rings = rings_of(part.quads, len(points))
-    for _ in range(UNTANGLE_ROUNDS):
+    for attempt in range(UNTANGLE_ROUNDS):
+        if attempt > 0:
+            _spread(points, part.quads, free)
         laplace(points, rings, free, LAPLACE_SWEEPS)
         if untangle(points, rings, free, 2, BAD) == 0:
             break
-        _spread(points, part.quads, free)
     newton(points, rings, free, NEWTON_SWEEPS, GOOD)
     return part._replace(points=points)
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
+from scipy.ndimage import label as connected
 
 from imgquad_core.denoise import DenoiseOptions, automatic_limits, list_removed, remove_noise
 from imgquad_core.errors import InputError
@@ -201,6 +202,9 @@ def test_the_ledger_counts_the_clusters_that_a_flood_fill_finds(labels: Labels) 
     clusters = [c for c in slow_clusters(labels) if any(changed[p] for p in c)]
     assert sum(r.clusters for r in list_removed(before, after)) == len(clusters)
     assert sum(r.pixels for r in list_removed(before, after)) == changed.sum()
+    for value in range(3):  # pixels that share sides stay together; only at corners may a cluster be parted before
+        part, n = connected(labels == value)
+        assert all(np.unique(changed[part == k]).size == 1 for k in range(1, n + 1))
 
 
 def test_the_ledger_counts_clusters_that_were_parted_at_a_corner_and_kept_in_part() -> None:

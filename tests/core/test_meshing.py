@@ -100,11 +100,16 @@ def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None
 def test_edges_are_halved_beside_points_that_fold_quads(refits: int, monkeypatch: pytest.MonkeyPatch) -> None:
     image = label_image(np.random.default_rng(2).integers(0, 3, (40, 40)))
     graph = boundaries(image, 5.0)
+    worst = meshing.WORST
+    monkeypatch.setattr(meshing, "WORST", 0.0)
+    as_it_was = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"))
     monkeypatch.setattr(meshing, "WORST", 0.5)  # so that something is worse
     monkeypatch.setattr(meshing, "REFITS", refits)
     monkeypatch.setattr(meshing, "WISHES", min(meshing.WISHES, refits))
     mesh = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"), image.materials)
     assert_valid_mesh(mesh, image)
+    before, after = (naive.worst_quality(m.points, m.quads) for m in (as_it_was, mesh))
+    assert before < worst < after
     n, edges, finer = len(graph.points), np.diff(graph.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
     assert mesh.points[:n].tobytes() == graph.points.tobytes()
     assert (finer > edges).any()
