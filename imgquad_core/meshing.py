@@ -53,7 +53,7 @@ BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge l
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
 WORST = 0.42  # below it the boundary's edges at the quad are halved, in
-WISHES = 2  # rounds at most; at folded quads in
+WISHES = 3  # rounds at most, of which the best one counts; at folded quads in
 REFITS = 16  # rounds, of which
 PATIENCE = 6  # reach no farther
 CONTRADICTIONS = 6  # rounds in which chains are halved whose coarse outlines contradict each other
@@ -135,6 +135,14 @@ class _Conflict(Exception):
         self.regions = regions
 
 
+class _State(NamedTuple):
+    """All faces meshed, after some rounds."""
+
+    graph: BoundaryGraph
+    parts: list[FaceQuads]
+    worst: float  # scaled Jacobian
+
+
 def mesh_boundaries(
     graph: BoundaryGraph, options: MeshingOptions | None = None, materials: Materials | None = None
 ) -> QuadMesh:
@@ -163,14 +171,16 @@ def mesh_boundaries(
     aside.start()
     options = options or MeshingOptions()
     graph = with_short_chains_halved(_consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTH)
+    best = _State(graph, [], -1.0)
     parts: list[FaceQuads] = []
     todo = np.ones(len(graph.region_label), bool)
     for attempt in range(REFITS + 1):
         done = _mesh_faces(graph, todo, options)
-        parts += done
+        parts = parts + done
+        best = max(best, _State(graph, parts, _worst_of(parts)), key=lambda state: state.worst)
         poor = _poor_rim(done, WORST if attempt < WISHES else 0.0)
-        if len(poor) == 0:
-            mesh = _stitch(graph, parts, materials or _materials_of(graph.region_label))
+        if len(poor) == 0 or (attempt >= WISHES and best.worst > 0.0):
+            mesh = _stitch(best.graph, best.parts, materials or _materials_of(graph.region_label))
             return _slid(mesh, EFFORTS[options.effort].slides, options.threads)
         finer = _refined(graph, poor, attempt)
         finer = _consistent(finer, _differ(graph, finer))
@@ -189,6 +199,12 @@ def _refined(graph: BoundaryGraph, poor: Ids, attempt: int) -> BoundaryGraph:
     if attempt == REFITS - 1:
         return halved(graph, np.ones(graph.n_chains, bool))
     return refined(graph, poor, 2 ** max(attempt - PATIENCE, 0) - 1)
+
+
+def _worst_of(parts: list[FaceQuads]) -> float:
+    """Return the worst scaled Jacobian."""
+    one = (worst_of_faces(p.points, p.quads, np.zeros_like(p.face), 1)[0] for p in parts)
+    return float(min(one, default=1.0))
 
 
 def _poor_rim(parts: list[FaceQuads], limit: float) -> Ids:
