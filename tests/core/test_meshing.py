@@ -120,17 +120,17 @@ def test_edges_are_halved_beside_points_that_fold_quads(refits: int, monkeypatch
 
 @pytest.mark.parametrize("best", [0, 1, 2])
 def test_of_the_rounds_that_halve_edges_the_best_one_counts(best: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    image = label_image(np.random.default_rng(2).integers(0, 3, (40, 40)))
-    graph = boundaries(image, 5.0)
+    image = label_image(voronoi(60, 50, 9, 1))
+    graph = boundaries(image, 4.0)
     edges: list[int] = []
 
     def pretended(parts: list[Any]) -> float:
         edges.append(len(np.unique(np.concatenate([part.origin for part in parts]))) - 1)
         return 0.9 if len(edges) == best + 1 else 0.3
 
-    monkeypatch.setattr(meshing, "WORST", 0.6)  # so that there are rounds
+    monkeypatch.setattr(meshing, "WORST", 0.9)  # so that there are rounds
     monkeypatch.setattr(meshing, "_worst_of", pretended)
-    mesh = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"), image.materials)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=4.0, effort="fast"), image.materials)
     assert_valid_mesh(mesh, image)
     assert len(edges) == meshing.WISHES + 1
     assert len(np.unique(mesh.chain_points)) == edges[best]
