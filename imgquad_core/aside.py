@@ -68,7 +68,7 @@ def compile_last_stages() -> None:
     fit_rim(points, rings, none, points, 1)
     laplace(points, rings, none, 1)
     untangle(points, rings, none, 1, BAD)
-    sector_angles(points, mesh.quads)
+    sector_angles(points, mesh.quads, none)
     worst_of_faces(points, mesh.quads, mesh.face, 1)
 
 

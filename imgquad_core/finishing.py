@@ -111,7 +111,7 @@ def _fitted(part: FaceQuads, targets: Points, whole: bool) -> FaceQuads:
     late = fit_rim(points, rings_of(part.quads, len(points)), rim, targets[part.origin], FIT_ROUNDS)
     if whole:
         points[late] = targets[part.origin[late]]
-    wanted = np.where(rim, wanted_quads(sector_angles(points, part.quads)), INNER_VALENCE)
+    wanted = np.where(rim, wanted_quads(sector_angles(points, part.quads, rim)), INNER_VALENCE)
     return part._replace(points=points, wanted=wanted)
 
 

@@ -38,22 +38,20 @@ def twins_of(faces: Ids, n_points: int) -> Ids:
     Both of two half-edges that run the same way between the same points (a folded mesh) get -2.
     """
     n = faces.shape[1]
-    flat = faces.ravel()
+    tail, head = faces.ravel(), np.empty(faces.size, np.int64)
+    for f in range(len(faces)):
+        for k in range(n):
+            head[n * f + k] = faces[f, k + 1 if k + 1 < n else 0]
     offsets, corners = corners_at(faces, n_points)
-    twins = np.full(flat.size, -1, np.int64)
-    for h in range(flat.size):
-        f = h // n
-        head = flat[n * f + (h + 1 - n * f) % n]
-        for i in range(offsets[head], offsets[head + 1]):
+    twins = np.full(tail.size, -1, np.int64)
+    for h in range(tail.size):
+        for i in range(offsets[head[h]], offsets[head[h] + 1]):
             c = corners[i]
-            g = c // n
-            if flat[n * g + (c + 1 - n * g) % n] == flat[h]:
+            if head[c] == tail[h]:
                 twins[h] = c if twins[h] == -1 else -2
-        tail = flat[h]
-        for i in range(offsets[tail], offsets[tail + 1]):
+        for i in range(offsets[tail[h]], offsets[tail[h] + 1]):
             c = corners[i]
-            g = c // n
-            if c != h and flat[n * g + (c + 1 - n * g) % n] == head:
+            if c != h and head[c] == head[h]:
                 twins[h] = -2
     return twins
 

@@ -78,21 +78,69 @@ def ring_quality(points: Points, rings: Rings, v: int) -> float:
 
 
 @verb
+def is_quad_above(points: Points, quads: Ids, q: int, floor: float) -> bool:
+    """Whether quad q has a scaled Jacobian of `floor` or more; fast where `floor` is positive."""
+    if floor <= 0.0:
+        return quad_quality(points, quads, q) >= floor
+    p = quads[q, 3]
+    ax, ay = points[quads[q, 0], 0] - points[p, 0], points[quads[q, 0], 1] - points[p, 1]
+    for k in range(4):  # squares instead of roots
+        p, n = quads[q, k], quads[q, (k + 1) & 3]
+        bx, by = points[n, 0] - points[p, 0], points[n, 1] - points[p, 1]
+        turn = ax * by - ay * bx
+        if turn <= 0.0 or turn * turn < floor * floor * (ax * ax + ay * ay) * (bx * bx + by * by):
+            return False
+        ax, ay = bx, by
+    return True
+
+
+@kernel
+def nodes_of_poor(points: Points, quads: Ids, below: float) -> Flags:
+    """Return which nodes have a quad of a scaled Jacobian below `below`."""
+    poor = np.zeros(len(points), np.bool_)
+    for q in range(len(quads)):
+        if not is_quad_above(points, quads, q, below):
+            for k in range(4):
+                poor[quads[q, k]] = True
+    return poor
+
+
+@verb
 def is_ring_above(points: Points, rings: Rings, v: int, floor: float) -> bool:
     """Whether the quads around node v have a scaled Jacobian of `floor` or more; fast where `floor` is positive."""
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        if not is_quad_above(points, rings.quads, rings.corners[i] >> 2, floor):
+            return False
+    return True
+
+
+@verb
+def is_sound(points: Points, rings: Rings, v: int, floor: float) -> bool:
+    """Whether a move of node v, before which its ring was above `floor`, has left it so.
+
+    The corner across each quad has not changed:
+
+        p---d
+        |   |
+        v---n
+    """
     if floor <= 0.0:
         return ring_quality(points, rings, v) >= floor
+    x, y, square = points[v, 0], points[v, 1], floor * floor
     for i in range(rings.offsets[v], rings.offsets[v + 1]):
-        q = rings.corners[i] >> 2
-        p = rings.quads[q, 3]
-        ax, ay = points[rings.quads[q, 0], 0] - points[p, 0], points[rings.quads[q, 0], 1] - points[p, 1]
-        for k in range(4):  # squares instead of roots
-            p, n = rings.quads[q, k], rings.quads[q, (k + 1) & 3]
-            bx, by = points[n, 0] - points[p, 0], points[n, 1] - points[p, 1]
-            turn = ax * by - ay * bx
-            if turn <= 0.0 or turn * turn < floor * floor * (ax * ax + ay * ay) * (bx * bx + by * by):
-                return False
-            ax, ay = bx, by
+        q, k = rings.corners[i] >> 2, rings.corners[i] & 3
+        n, d, p = rings.quads[q, (k + 1) & 3], rings.quads[q, (k + 2) & 3], rings.quads[q, (k + 3) & 3]
+        vn_x, vn_y = points[n, 0] - x, points[n, 1] - y
+        pv_x, pv_y = x - points[p, 0], y - points[p, 1]
+        nd_x, nd_y = points[d, 0] - points[n, 0], points[d, 1] - points[n, 1]
+        dp_x, dp_y = points[p, 0] - points[d, 0], points[p, 1] - points[d, 1]
+        at_v, at_n, at_p = pv_x * vn_y - pv_y * vn_x, vn_x * nd_y - vn_y * nd_x, dp_x * pv_y - dp_y * pv_x
+        if at_v <= 0.0 or at_n <= 0.0 or at_p <= 0.0:
+            return False
+        vn, pv = square * (vn_x * vn_x + vn_y * vn_y), pv_x * pv_x + pv_y * pv_y
+        nd, dp = nd_x * nd_x + nd_y * nd_y, square * (dp_x * dp_x + dp_y * dp_y)
+        if at_v * at_v < vn * pv or at_n * at_n < vn * nd or at_p * at_p < dp * pv:
+            return False
     return True
 
 
@@ -109,10 +157,23 @@ def _activate_ring(active: Flags, rings: Rings, v: int) -> None:
             active[rings.quads[rings.corners[i] >> 2, k]] = True
 
 
+@verb
+def _is_fair(points: Points, rings: Rings, v: int, fair: Flags) -> bool:
+    """Whether the quads around node v are above the guard; those found so are marked."""
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        q = rings.corners[i] >> 2
+        if not fair[q]:
+            if not is_quad_above(points, rings.quads, q, GUARD):
+                return False
+            fair[q] = True
+    return True
+
+
 @kernel
 def laplace(points: Points, rings: Rings, free: Flags, sweeps: int) -> None:
     """Move free nodes to the mean of their edge neighbours, in place, while anything moves (at most `sweeps` times)."""
     active = free.copy()
+    fair = np.zeros(len(rings.quads), np.bool_)  # quads known to be above the guard
     for _ in range(sweeps):
         moved = False
         for v in range(len(points)):
@@ -131,11 +192,14 @@ def laplace(points: Points, rings: Rings, free: Flags, sweeps: int) -> None:
             x, y = x / n, y / n
             if abs(x - old_x) + abs(y - old_y) < TOLERANCE * reach / n:
                 continue
-            need = guarded(points, rings, v)
+            need = GUARD if _is_fair(points, rings, v, fair) else ring_quality(points, rings, v)
             points[v, 0], points[v, 1] = x, y
-            if not is_ring_above(points, rings, v, need):
+            if not is_sound(points, rings, v, need):
                 points[v, 0], points[v, 1] = old_x, old_y
                 continue
+            if need < GUARD:
+                for i in range(rings.offsets[v], rings.offsets[v + 1]):
+                    fair[rings.corners[i] >> 2] = False
             _activate_ring(active, rings, v)
             moved = True
         if not moved:
@@ -215,7 +279,7 @@ def _newton_step(out: Points) -> tuple[float, float]:
 @kernel
 def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) -> None:
     """Lower the energy of rings that hold a quad worse than `good`, node by node, in place."""
-    active = free.copy()
+    active = nodes_of_poor(points, rings.quads, good)
     now, then = np.empty(6), np.empty(6)
     for _ in range(sweeps):
         moved = False
@@ -237,7 +301,7 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             for _ in range(HALVINGS):
                 points[v, 0], points[v, 1] = x + dx, y + dy
                 ring_energy(points, rings, v, then)
-                if then[0] < now[0] and is_ring_above(points, rings, v, need):
+                if then[0] < now[0] and is_sound(points, rings, v, need):
                     break  # the energy alone would pay for length with angles
                 points[v, 0], points[v, 1] = x, y
                 dx, dy = 0.5 * dx, 0.5 * dy
@@ -263,7 +327,7 @@ def _reach_of(points: Points, rings: Rings, v: int) -> tuple[float, float]:
 @kernel
 def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float) -> int:
     """Raise the worst scaled Jacobian of rings below `bad` by a pattern search, in place; return the rings left bad."""
-    todo, low = free.copy(), np.zeros(len(points), np.bool_)
+    todo, low = nodes_of_poor(points, rings.quads, bad), np.zeros(len(points), np.bool_)
     for _ in range(rounds):
         moved = False
         for v in range(len(points)):
@@ -351,22 +415,13 @@ def worst_of_faces(points: Points, quads: Ids, face: Ids, n_faces: int) -> Point
 
 
 @kernel
-def nodes_of_poor(points: Points, quads: Ids, below: float) -> Flags:
-    """Return which nodes have a quad of a scaled Jacobian below `below`."""
-    poor = np.zeros(len(points), np.bool_)
-    for q in range(len(quads)):
-        if quad_quality(points, quads, q) < below:
-            for k in range(4):
-                poor[quads[q, k]] = True
-    return poor
-
-
-@kernel
-def sector_angles(points: Points, quads: Ids) -> Points:
-    """Sum of the corner angles at each node: the angle of its sector for a node on the rim."""
+def sector_angles(points: Points, quads: Ids, rim: Flags) -> Points:
+    """Sum of the corner angles at each rim node: the angle of its sector; 0 for the others."""
     angle = np.zeros(len(points))
     for q in range(len(quads)):
         for k in range(4):
+            if not rim[quads[q, k]]:
+                continue
             v, a, b = quads[q, k], quads[q, (k + 1) & 3], quads[q, (k + 3) & 3]
             ax, ay = points[a, 0] - points[v, 0], points[a, 1] - points[v, 1]
             bx, by = points[b, 0] - points[v, 0], points[b, 1] - points[v, 1]

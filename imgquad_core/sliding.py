@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .jit import kernel, verb
 from .model import PointKind
-from .relaxation import HALVINGS, Rings, guarded, is_ring_above, ring_energy
+from .relaxation import HALVINGS, Rings, guarded, is_ring_above, is_sound, ring_energy
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -56,7 +56,7 @@ def _slide_node(points: Points, rings: Rings, v: int, p: int, n: int, gone: Poin
     for _ in range(HALVINGS):
         points[v, 0], points[v, 1] = x + step * tx, y + step * ty
         ring_energy(points, rings, v, energy)
-        if energy[0] < least and is_ring_above(points, rings, v, need):
+        if energy[0] < least and is_sound(points, rings, v, need):
             gone[v] += step
             return
         step *= 0.5
