@@ -18,6 +18,7 @@ Part = TypeVar("Part")
 Result = TypeVar("Result")
 
 BATCH = 3000  # quads, so that a batch stays in the cache
+LARGEST = 3 * BATCH  # quads of a face that shares its batch with others
 TILE = 8  # edge lengths; quads of a batch are numbered tile by tile
 
 
@@ -35,16 +36,23 @@ def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) 
 
 
 def batches_of(mesh: FaceQuads) -> list[FaceQuads]:
-    """Cut the mesh into groups of neighbouring faces (by number) of about `BATCH` quads."""
+    """Cut the mesh into groups of neighbouring faces (by number) of about `BATCH` quads, and faces that are large."""
     if len(mesh.quads) == 0:
         return []
     per_face = np.bincount(mesh.face)
-    batch_of_face = (np.cumsum(per_face) - per_face) // BATCH
-    batch = batch_of_face[mesh.face]
+    nth, alone = (np.cumsum(per_face) - per_face) // BATCH, per_face > LARGEST
+    begins = (np.diff(nth, prepend=0) > 0) | alone
+    begins[1:] |= alone[:-1]
+    batch = np.cumsum(begins)[mesh.face]
     order = np.lexsort((_tile(mesh), mesh.face, batch))
     ends = np.flatnonzero(np.diff(batch[order])) + 1
     new = np.full(len(mesh.points), -1, np.int64)  # one for all parts: they share no point
     return [taken_out(mesh, chosen, new)[0] for chosen in np.split(order, ends)]
+
+
+def is_large(batch: FaceQuads) -> bool:
+    """Whether a batch is one large face."""
+    return len(batch.quads) > LARGEST and bool((batch.face == batch.face[0]).all())
 
 
 def _tile(mesh: FaceQuads) -> Ids:

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .batches import batches_of, faces_only, in_batches, in_threads, joined
+from .batches import in_threads, is_large, joined
 from .frontal import wanted_quads
 from .halfedge import twins_of
-from .pieces import LARGEST, LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
+from .pieces import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
 from .relaxation import (
     BAD,
     GOOD,
@@ -42,14 +42,14 @@ POOR = 0.7  # scaled Jacobian below which single quads are replaced
 
 
 def finished(
-    composed: FaceQuads, targets: Points, middles: Constraints | None, how: CleanUp, threads: int
+    batches: list[FaceQuads], targets: Points, middles: Constraints | None, how: CleanUp, threads: int
 ) -> FaceQuads:
     """Turn composed quads into the final ones of their faces.
 
     Parameters
     ----------
-    composed : FaceQuads
-        Quads of several faces.
+    batches : list of FaceQuads
+        Composed quads, from `batches_of`.
     targets : float64, shape (n, 2)
         Where the rim belongs: points of the boundary, by `FaceQuads.origin`.
     middles : Constraints, optional
@@ -72,9 +72,8 @@ def finished(
             part = _halved(_relaxed_in_pieces(part, *DRAFT, threads), middles)
         return _relaxed_in_pieces(_fitted(part, targets, True), *LAST, threads)
 
-    is_large = np.bincount(composed.face) > LARGEST
-    small = in_batches(faces_only(composed, ~is_large), whole, threads)
-    single = list(map(large, batches_of(faces_only(composed, is_large))))
+    small = in_threads([part for part in batches if not is_large(part)], whole, threads)
+    single = [large(part) for part in batches if is_large(part)]
     return joined([*small, *in_threads(single, _without_poor, threads)])
 
 

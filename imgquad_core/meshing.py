@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import aside
-from .batches import faces_only, in_threads, joined, no_quads
+from .batches import LARGEST, batches_of, faces_only, in_threads, joined, no_quads
 from .composing import compose
 from .crossfield import cross_field
 from .cutting import CutMesh, FaceConflict, cut_at_constraints
@@ -36,7 +36,7 @@ from .outline import (
     wide_faces,
     with_short_chains_halved,
 )
-from .pieces import LARGEST, independent_nodes, strips_of
+from .pieces import independent_nodes, strips_of
 from .quality import scaled_jacobian
 from .relaxation import GOOD, newton, rings_of, untangle, worst_of_faces
 from .sliding import slide
@@ -50,6 +50,7 @@ Points = NDArray[np.float64]
 STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
 LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
+GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, at least; groups at most
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
 WORST = 0.42  # below it the boundary's edges at the quad are halved, in
@@ -275,13 +276,22 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
     """Mesh the flagged faces from segments of `stride` edges."""
     if not faces.any():
         return _Level(no_quads(), faces, np.full(len(faces), -1.0))
-    composed = _compose(graph, faces, stride, options)
+    groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
+    composed = in_threads(groups, lambda group: batches_of(_compose(graph, group, stride, options)), options.threads)
     aside.wait()
     edges = coarse_segments(graph, chains_of(graph, faces), 2)
     nothing = np.zeros(len(edges.tail), np.int64)
     middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)
-    quads = finished(composed, graph.points, middles if stride == 4 else None, how, options.threads)
+    quads = finished(sum(composed, []), graph.points, middles if stride == 4 else None, how, options.threads)
     return _Level(quads, faces, worst_of_faces(quads.points, quads.quads, quads.face, len(faces)))
+
+
+def _groups_of(graph: BoundaryGraph, faces: Flags, sizes: Points) -> list[Flags]:
+    """Return the flagged faces in groups of neighbours (by number) that threads can share, whatever their number."""
+    quads = np.where(faces, graph.region_pixels / sizes**2, 0.0)
+    count = int(np.clip(quads.sum() / GROUP, 1, MOST_GROUPS))
+    group = np.floor((np.cumsum(quads) - 0.5 * quads) / quads.sum() * count)
+    return [mine for g in range(count) if (mine := faces & (group == g)).any()]
 
 
 def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:

@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .batches import BATCH, in_threads, taken_out
+from .batches import in_threads, taken_out
 from .jit import kernel
 from .splitting import FaceQuads
 
@@ -25,7 +25,6 @@ Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-LARGEST = 3 * BATCH  # quads of a face that stays whole
 WIDTH = 64  # quads across a strip, about: many times a cavity
 LEFT_ALONE = -1  # number of the piece that is not worked on
 
