@@ -34,7 +34,7 @@ Points = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FIT_ROUNDS = 6
-DRAFT, LAST, REPAIRED = (3, 0), (8, 6), (3, 6)  # sweeps of Laplace and of Newton: early, at the end, after repairs
+DRAFT, FULL, AGAIN = (3, 0), (8, 6), (3, 6)  # sweeps of Laplace and of Newton: before the clean-up, after it, again
 RETRIED = 6  # quads beside a seam within which the clean-up of a large face looks again
 ROOM = 10  # quads around a place that its cavities can reach
 REACH = 3  # quads beside a seam that are smoothed again
@@ -62,16 +62,17 @@ def finished(
 
     def whole(part: FaceQuads) -> FaceQuads:
         part = clean_up(_relaxed(_fitted(part, targets, False), *DRAFT), how)
-        if middles is not None:
-            part = _halved(_relaxed(part, *DRAFT), middles)
-        return _without_poor(_relaxed(_fitted(part, targets, True), *LAST))
+        if middles is not None:  # smoothed while there are a quarter of the nodes
+            part = _halved(_relaxed(part, *FULL), middles)
+        return _without_poor(_relaxed(_fitted(part, targets, True), *last))
 
     def large(part: FaceQuads) -> FaceQuads:
         part = _cleaned_in_pieces(_fitted(part, targets, False), how, threads)
         if middles is not None:
-            part = _halved(_relaxed_in_pieces(part, *DRAFT, threads), middles)
-        return _relaxed_in_pieces(_fitted(part, targets, True), *LAST, threads)
+            part = _halved(_relaxed_in_pieces(part, *FULL, threads), middles)
+        return _relaxed_in_pieces(_fitted(part, targets, True), *last, threads)
 
+    last = FULL if middles is None else AGAIN
     small = in_threads([part for part in batches if not is_large(part)], whole, threads)
     single = [large(part) for part in batches if is_large(part)]
     return joined([*small, *in_threads(single, _without_poor, threads)])
@@ -141,4 +142,4 @@ def _without_poor(part: FaceQuads) -> FaceQuads:
 
 def _repaired(part: FaceQuads) -> FaceQuads:
     better, beside = repair(part, POOR)
-    return _relaxed(better, *REPAIRED, beside)
+    return _relaxed(better, *AGAIN, beside)

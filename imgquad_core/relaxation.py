@@ -22,7 +22,7 @@ Points = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 GUARD = 0.6  # a move may lower a ring's worst scaled Jacobian down to this, not further
-TOLERANCE = 0.01  # of the edge length: smaller moves stop the activity of a node
+TOLERANCE = 0.015  # of the edge length: smaller moves stop the activity of a node
 GOOD = 0.9  # Newton works on rings with a quad below this
 BAD = 0.35  # the pattern search works on rings below this
 SHORT = 0.25  # of the longest edge at a node: the pattern search makes no edge there shorter, for angles alone
