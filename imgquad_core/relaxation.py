@@ -115,31 +115,41 @@ def is_ring_above(points: Points, rings: Rings, v: int, floor: float) -> bool:
 
 
 @verb
-def is_sound(points: Points, rings: Rings, v: int, floor: float) -> bool:
-    """Whether a move of node v, before which its ring was above `floor`, has left it so.
-
-    The corner across each quad has not changed:
+def _turns(points: Points, quads: Ids, corner: int) -> tuple[float, float, float, float, float, float, float]:
+    """Cross products of the edges at three corners of a quad, then the squares of its edges.
 
         p---d
-        |   |
+        |   |      the corner is at v; the one at d does not feel where v is
         v---n
     """
+    q, k = corner >> 2, corner & 3
+    v, n, d, p = quads[q, k], quads[q, (k + 1) & 3], quads[q, (k + 2) & 3], quads[q, (k + 3) & 3]
+    vn_x, vn_y = points[n, 0] - points[v, 0], points[n, 1] - points[v, 1]
+    nd_x, nd_y = points[d, 0] - points[n, 0], points[d, 1] - points[n, 1]
+    dp_x, dp_y = points[p, 0] - points[d, 0], points[p, 1] - points[d, 1]
+    pv_x, pv_y = points[v, 0] - points[p, 0], points[v, 1] - points[p, 1]
+    return (
+        pv_x * vn_y - pv_y * vn_x,
+        vn_x * nd_y - vn_y * nd_x,
+        dp_x * pv_y - dp_y * pv_x,
+        vn_x * vn_x + vn_y * vn_y,
+        nd_x * nd_x + nd_y * nd_y,
+        dp_x * dp_x + dp_y * dp_y,
+        pv_x * pv_x + pv_y * pv_y,
+    )
+
+
+@verb
+def is_sound(points: Points, rings: Rings, v: int, floor: float) -> bool:
+    """Whether a move of node v, before which its ring was above `floor`, has left it so."""
     if floor <= 0.0:
         return ring_quality(points, rings, v) >= floor
-    x, y, square = points[v, 0], points[v, 1], floor * floor
+    square = floor * floor
     for i in range(rings.offsets[v], rings.offsets[v + 1]):
-        q, k = rings.corners[i] >> 2, rings.corners[i] & 3
-        n, d, p = rings.quads[q, (k + 1) & 3], rings.quads[q, (k + 2) & 3], rings.quads[q, (k + 3) & 3]
-        vn_x, vn_y = points[n, 0] - x, points[n, 1] - y
-        pv_x, pv_y = x - points[p, 0], y - points[p, 1]
-        nd_x, nd_y = points[d, 0] - points[n, 0], points[d, 1] - points[n, 1]
-        dp_x, dp_y = points[p, 0] - points[d, 0], points[p, 1] - points[d, 1]
-        at_v, at_n, at_p = pv_x * vn_y - pv_y * vn_x, vn_x * nd_y - vn_y * nd_x, dp_x * pv_y - dp_y * pv_x
+        at_v, at_n, at_p, vn, nd, dp, pv = _turns(points, rings.quads, rings.corners[i])
         if at_v <= 0.0 or at_n <= 0.0 or at_p <= 0.0:
             return False
-        vn, pv = square * (vn_x * vn_x + vn_y * vn_y), pv_x * pv_x + pv_y * pv_y
-        nd, dp = nd_x * nd_x + nd_y * nd_y, square * (dp_x * dp_x + dp_y * dp_y)
-        if at_v * at_v < vn * pv or at_n * at_n < vn * nd or at_p * at_p < dp * pv:
+        if at_v**2 < square * pv * vn or at_n**2 < square * vn * nd or at_p**2 < square * dp * pv:
             return False
     return True
 
@@ -266,6 +276,18 @@ def ring_energy(points: Points, rings: Rings, v: int, out: Points) -> None:
 
 
 @verb
+def energy_of(points: Points, rings: Rings, v: int) -> float:
+    """Sum the energy alone of the same corners; inf where one is folded."""
+    total = 0.0
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        at_v, at_n, at_p, vn, nd, dp, pv = _turns(points, rings.quads, rings.corners[i])
+        if at_v <= 0.0 or at_n <= 0.0 or at_p <= 0.0:
+            return np.inf
+        total += (((pv + vn) / at_v) ** 4 + ((vn + nd) / at_n) ** 4 + ((dp + pv) / at_p) ** 4) / 16.0
+    return total
+
+
+@verb
 def _newton_step(out: Points) -> tuple[float, float]:
     """Descent step from energy derivatives: Newton's, with the Hessian shifted to be positive definite."""
     gx, gy, hxx, hxy, hyy = out[1], out[2], out[3], out[4], out[5]
@@ -280,7 +302,7 @@ def _newton_step(out: Points) -> tuple[float, float]:
 def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) -> None:
     """Lower the energy of rings that hold a quad worse than `good`, node by node, in place."""
     active = nodes_of_poor(points, rings.quads, good)
-    now, then = np.empty(6), np.empty(6)
+    now = np.empty(6)
     for _ in range(sweeps):
         moved = False
         for v in range(len(points)):
@@ -300,8 +322,7 @@ def newton(points: Points, rings: Rings, free: Flags, sweeps: int, good: float) 
             reach = abs(points[w, 0] - x) + abs(points[w, 1] - y)
             for _ in range(HALVINGS):
                 points[v, 0], points[v, 1] = x + dx, y + dy
-                ring_energy(points, rings, v, then)
-                if then[0] < now[0] and is_sound(points, rings, v, need):
+                if energy_of(points, rings, v) < now[0] and is_sound(points, rings, v, need):
                     break  # the energy alone would pay for length with angles
                 points[v, 0], points[v, 1] = x, y
                 dx, dy = 0.5 * dx, 0.5 * dy

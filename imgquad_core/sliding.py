@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .jit import kernel, verb
 from .model import PointKind
-from .relaxation import HALVINGS, Rings, guarded, is_ring_above, is_sound, ring_energy
+from .relaxation import HALVINGS, Rings, energy_of, guarded, is_ring_above, is_sound, ring_energy
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -55,8 +55,7 @@ def _slide_node(points: Points, rings: Rings, v: int, p: int, n: int, gone: Poin
     step = min(max(gone[v] - slope / bend, -REACH), REACH) - gone[v]
     for _ in range(HALVINGS):
         points[v, 0], points[v, 1] = x + step * tx, y + step * ty
-        ring_energy(points, rings, v, energy)
-        if energy[0] < least and is_sound(points, rings, v, need):
+        if energy_of(points, rings, v) < least and is_sound(points, rings, v, need):
             gone[v] += step
             return
         step *= 0.5
