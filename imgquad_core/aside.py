@@ -48,7 +48,7 @@ def wait() -> None:
 
 def compile_last_stages() -> None:
     """Compile the optimisation of quads, by using it on one."""
-    from .relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, sector_angles, untangle, worst_of_faces
+    from .relaxation import BAD, GOOD, fit_rim, laplace, lower_to_worst, newton, rings_of, sector_angles, untangle
     from .repair import repair
     from .sliding import slide
     from .splitting import FaceQuads, split_quads
@@ -69,7 +69,7 @@ def compile_last_stages() -> None:
     laplace(points, rings, none, 1)
     untangle(points, rings, none, 1, BAD)
     sector_angles(points, mesh.quads, none)
-    worst_of_faces(points, mesh.quads, mesh.face, 1)
+    lower_to_worst(points, mesh.quads, mesh.face, np.ones(1))
 
 
 if __name__ == "__main__":

@@ -105,9 +105,3 @@ def faces_only(mesh: FaceQuads, faces: NDArray[np.bool_]) -> FaceQuads:
     """Keep the quads of the flagged faces."""
     keep = np.flatnonzero(faces[mesh.face])
     return mesh if len(keep) == len(mesh.face) else taken_out(mesh, keep, np.full(len(mesh.points), -1, np.int64))[0]
-
-
-def no_quads() -> FaceQuads:
-    """Return an empty mesh."""
-    none = np.empty(0, np.int64)
-    return FaceQuads(np.empty((0, 2)), np.empty((0, 4), np.int64), none, none, none)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .batches import in_threads, is_large, joined
+from .batches import in_threads, is_large
 from .frontal import wanted_quads
 from .halfedge import twins_of
 from .pieces import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
@@ -43,8 +43,8 @@ POOR = 0.7  # scaled Jacobian below which single quads are replaced
 
 def finished(
     batches: list[FaceQuads], targets: Points, middles: Constraints | None, how: CleanUp, threads: int
-) -> FaceQuads:
-    """Turn composed quads into the final ones of their faces.
+) -> list[FaceQuads]:
+    """Turn composed quads into the final ones of their faces, batch by batch.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def finished(
     last = FULL if middles is None else AGAIN
     small = in_threads([part for part in batches if not is_large(part)], whole, threads)
     single = [large(part) for part in batches if is_large(part)]
-    return joined([*small, *in_threads(single, _without_poor, threads)])
+    return [*small, *in_threads(single, _without_poor, threads)]
 
 
 def _halved(part: FaceQuads, middles: Constraints) -> FaceQuads:

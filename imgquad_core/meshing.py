@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import aside
-from .batches import LARGEST, batches_of, faces_only, in_threads, joined, no_quads
+from .batches import LARGEST, batches_of, faces_only, in_threads, joined
 from .composing import compose
 from .crossfield import cross_field
 from .cutting import CutMesh, FaceConflict, cut_at_constraints
@@ -38,7 +38,7 @@ from .outline import (
 )
 from .pieces import independent_nodes, strips_of
 from .quality import scaled_jacobian
-from .relaxation import GOOD, newton, rings_of, untangle, worst_of_faces
+from .relaxation import GOOD, lower_to_worst, newton, rings_of, untangle
 from .sliding import slide
 from .splitting import FaceQuads, split_composed
 from .topology import CleanUp
@@ -136,6 +136,14 @@ class _Conflict(Exception):
         self.regions = regions
 
 
+class _Meshed(NamedTuple):
+    """Some faces meshed."""
+
+    parts: list[FaceQuads]
+    faces: Flags  # which
+    worst: Points  # scaled Jacobian of each of them, 1 for others
+
+
 class _State(NamedTuple):
     """All faces meshed, after some rounds."""
 
@@ -174,11 +182,11 @@ def mesh_boundaries(
     graph = with_short_chains_halved(_consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTH)
     best = _State(graph, [], -1.0)
     parts: list[FaceQuads] = []
-    todo = np.ones(len(graph.region_label), bool)
+    todo, worst = np.ones(len(graph.region_label), bool), np.ones(len(graph.region_label))
     for attempt in range(REFITS + 1):
         done = _mesh_faces(graph, todo, options)
-        parts = parts + done
-        best = max(best, _State(graph, parts, _worst_of(parts)), key=lambda state: state.worst)
+        parts, worst = parts + done.parts, np.where(todo, done.worst, worst)
+        best = max(best, _State(graph, parts, worst.min(initial=1.0)), key=lambda state: state.worst)
         poor = _poor_rim(done, WORST if attempt < WISHES else 0.0)
         if len(poor) == 0 or (attempt >= WISHES and best.worst > 0.0):
             mesh = _stitch(best.graph, best.parts, materials or _materials_of(graph.region_label))
@@ -186,7 +194,7 @@ def mesh_boundaries(
         finer = _refined(graph, poor, attempt)
         finer = _consistent(finer, _differ(graph, finer))
         todo = _faces_beside(graph, _differ(graph, finer))
-        parts = [faces_only(part, ~todo) for part in parts]
+        parts = _faces_of(parts, ~todo)
         graph = finer
     raise TopologyError(f"{len(poor)} boundary points fold quads, the first at {graph.points[poor[0]].tolist()}")
 
@@ -202,18 +210,16 @@ def _refined(graph: BoundaryGraph, poor: Ids, attempt: int) -> BoundaryGraph:
     return refined(graph, poor, 2 ** max(attempt - PATIENCE, 0) - 1)
 
 
-def _worst_of(parts: list[FaceQuads]) -> float:
-    """Return the worst scaled Jacobian."""
-    one = (worst_of_faces(p.points, p.quads, np.zeros_like(p.face), 1)[0] for p in parts)
-    return float(min(one, default=1.0))
+def _faces_of(parts: list[FaceQuads], faces: Flags) -> list[FaceQuads]:
+    """Keep the quads of the flagged faces."""
+    return [kept for part in parts if len((kept := faces_only(part, faces)).quads)]
 
 
-def _poor_rim(parts: list[FaceQuads], limit: float) -> Ids:
+def _poor_rim(meshed: _Meshed, limit: float) -> Ids:
     """Return the boundary points of quads not above `limit`, and all those of a face whose such quads have none."""
-    found = []
-    for part in parts:
-        worst = worst_of_faces(part.points, part.quads, part.face, part.face.max(initial=-1) + 1)
-        looked_at = np.flatnonzero(worst[part.face] <= limit)
+    found = [np.empty(0, np.int64)]
+    for part in meshed.parts if (meshed.worst <= limit).any() else ():
+        looked_at = np.flatnonzero(meshed.worst[part.face] <= limit)
         poor = looked_at[scaled_jacobian(part.points, part.quads[looked_at]) <= limit]
         origin = part.origin[part.quads[poor]]
         inner = np.setdiff1d(part.face[poor], part.face[poor[(origin >= 0).any(axis=1)]])
@@ -243,27 +249,22 @@ def _consistent(graph: BoundaryGraph, new: Flags) -> BoundaryGraph:
     raise TopologyError("the boundaries of the regions cross or contradict each other")
 
 
-def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> list[FaceQuads]:
+def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> _Meshed:
     """Mesh flagged faces on their levels."""
     effort = EFFORTS[options.effort]
     wide = wide_faces(graph, LEAST_WIDTH) & todo
     coarse = _mesh_wide(graph, wide, effort.wide, options)
-    large = np.bincount(coarse.quads.face, minlength=len(todo)) > LARGE
+    large = np.zeros(len(todo), bool)
+    for part in coarse.parts:
+        large |= np.bincount(part.face, minlength=len(todo)) > LARGE
     again = wide & (coarse.worst < np.where(large, min(WORST, effort.again_below), effort.again_below))
     fine = _mesh_level(graph, todo & ~wide | again, 2, effort.narrow, options)
-    better = fine.meshed & ~(wide & (coarse.worst >= fine.worst))
-    return [faces_only(coarse.quads, ~better), faces_only(fine.quads, better)]
+    better = fine.faces & ~(wide & (coarse.worst >= fine.worst))
+    parts = _faces_of(coarse.parts, ~better) + _faces_of(fine.parts, better)
+    return _Meshed(parts, todo, np.where(better, fine.worst, coarse.worst))
 
 
-class _Level(NamedTuple):
-    """Some faces meshed with one stride."""
-
-    quads: FaceQuads
-    meshed: Flags  # which faces
-    worst: Points  # scaled Jacobian of each face
-
-
-def _mesh_wide(graph: BoundaryGraph, wide: Flags, how: CleanUp, options: MeshingOptions) -> _Level:
+def _mesh_wide(graph: BoundaryGraph, wide: Flags, how: CleanUp, options: MeshingOptions) -> _Meshed:
     """Mesh faces with stride 4, without those whose chords contradict each other (`wide` is updated)."""
     while True:
         try:
@@ -272,18 +273,21 @@ def _mesh_wide(graph: BoundaryGraph, wide: Flags, how: CleanUp, options: Meshing
             wide[conflict.regions] = False
 
 
-def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> _Level:
+def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> _Meshed:
     """Mesh the flagged faces from segments of `stride` edges."""
+    worst = np.ones(len(faces))
     if not faces.any():
-        return _Level(no_quads(), faces, np.full(len(faces), -1.0))
+        return _Meshed([], faces, worst)
     groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
     composed = in_threads(groups, lambda group: batches_of(_compose(graph, group, stride, options)), options.threads)
     aside.wait()
     edges = coarse_segments(graph, chains_of(graph, faces), 2)
     nothing = np.zeros(len(edges.tail), np.int64)
     middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)
-    quads = finished(sum(composed, []), graph.points, middles if stride == 4 else None, how, options.threads)
-    return _Level(quads, faces, worst_of_faces(quads.points, quads.quads, quads.face, len(faces)))
+    batches = [batch for group in composed for batch in group]
+    parts = finished(batches, graph.points, middles if stride == 4 else None, how, options.threads)
+    in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.threads)
+    return _Meshed(parts, faces, worst)
 
 
 def _groups_of(graph: BoundaryGraph, faces: Flags, sizes: Points) -> list[Flags]:

@@ -18,7 +18,7 @@ from .halfedge import corners_at
 from .model import PointKind, QuadMesh
 from .pieces import nodes_around
 from .quality import corner_angles, scaled_jacobian, sectors_of
-from .relaxation import BAD, GOOD, laplace, newton, nodes_of_poor, rings_of, untangle, worst_of_faces
+from .relaxation import BAD, GOOD, laplace, lower_to_worst, newton, nodes_of_poor, rings_of, untangle
 from .splitting import INNER_VALENCE, FaceQuads
 from .topology import CleanUp, clean_up
 
@@ -128,7 +128,9 @@ def _spread(points: NDArray[np.float64], quads: Ids, free: NDArray[np.bool_]) ->
 
 def _is_better(old: FaceQuads, new: FaceQuads, n_faces: int) -> NDArray[np.bool_]:
     """Tell of each face whether its new quads are better than its old ones."""
-    worst_old, worst_new = (worst_of_faces(m.points, m.quads, m.face, n_faces) for m in (old, new))
+    worst_old, worst_new = np.ones((2, n_faces))
+    lower_to_worst(old.points, old.quads, old.face, worst_old)
+    lower_to_worst(new.points, new.quads, new.face, worst_new)
     odd_old, odd_new = _irregular(old, n_faces), _irregular(new, n_faces)
     fewer = (odd_new < odd_old) & (worst_new >= np.minimum(worst_old, GOOD_ENOUGH))
     rounder = (worst_new == worst_old) & (_loss(new, n_faces) < _loss(old, n_faces))

@@ -118,9 +118,9 @@ def is_ring_above(points: Points, rings: Rings, v: int, floor: float) -> bool:
 def _turns(points: Points, quads: Ids, corner: int) -> tuple[float, float, float, float, float, float, float]:
     """Cross products of the edges at three corners of a quad, then the squares of its edges.
 
-        p---d
-        |   |      the corner is at v; the one at d does not feel where v is
-        v---n
+    p---d
+    |   |      the corner is at v; the one at d does not feel where v is
+    v---n
     """
     q, k = corner >> 2, corner & 3
     v, n, d, p = quads[q, k], quads[q, (k + 1) & 3], quads[q, (k + 2) & 3], quads[q, (k + 3) & 3]
@@ -427,12 +427,10 @@ def _approach(points: Points, rings: Rings, late: Flags, targets: Points) -> Fla
 
 
 @kernel
-def worst_of_faces(points: Points, quads: Ids, face: Ids, n_faces: int) -> Points:
-    """Worst scaled Jacobian of each face's quads, 1 where it has none."""
-    worst = np.full(n_faces, 1.0)
+def lower_to_worst(points: Points, quads: Ids, face: Ids, worst: Points) -> None:
+    """Lower the value of each face to the worst scaled Jacobian of its quads, in place."""
     for q in range(len(quads)):
         worst[face[q]] = min(worst[face[q]], quad_quality(points, quads, q))
-    return worst
 
 
 @kernel

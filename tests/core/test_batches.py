@@ -9,7 +9,7 @@ import pytest
 
 from faces import areas, assert_valid_faces, quads_of, voronoi_graph
 from imgquad_core import batches
-from imgquad_core.batches import faces_only, in_batches, joined, no_quads
+from imgquad_core.batches import faces_only, in_batches, joined
 from imgquad_core.splitting import FaceQuads
 from imgquad_core.topology import CleanUp, clean_up
 
@@ -90,7 +90,7 @@ def test_some_faces_only(grains: FaceQuads) -> None:
 
 def test_joining_shifts_ids() -> None:
     mesh = quads_of(voronoi_graph(64, 3, 2.0, 1), 2.0)
-    both = joined([mesh, no_quads(), mesh])
+    both = joined([mesh, faces_only(mesh, np.zeros(16, bool)), mesh])
     n = len(mesh.points)
     assert np.array_equal(both.quads, np.vstack([mesh.quads, mesh.quads + n]))
     assert np.array_equal(both.points[n:], mesh.points)

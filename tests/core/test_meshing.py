@@ -16,6 +16,7 @@ from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.meshing import EFFORTS, MeshingOptions, mesh_boundaries
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind, QuadMesh
 from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
+from imgquad_core.splitting import FaceQuads
 from invariants import assert_valid_mesh
 from shapes import Labels, disc, label_image, voronoi
 
@@ -123,13 +124,14 @@ def test_of_the_rounds_that_halve_edges_the_best_one_counts(best: int, monkeypat
     image = label_image(voronoi(60, 50, 9, 1))
     graph = boundaries(image, 4.0)
     edges: list[int] = []
+    state = meshing._State
 
-    def pretended(parts: list[Any]) -> float:
+    def pretended(graph: BoundaryGraph, parts: list[FaceQuads], worst: float) -> meshing._State:
         edges.append(len(np.unique(np.concatenate([part.origin for part in parts]))) - 1)
-        return 0.9 if len(edges) == best + 1 else 0.3
+        return state(graph, parts, 0.9 if len(edges) == best + 1 else 0.3)
 
     monkeypatch.setattr(meshing, "WORST", 0.9)  # so that there are rounds
-    monkeypatch.setattr(meshing, "_worst_of", pretended)
+    monkeypatch.setattr(meshing, "_State", pretended)
     mesh = mesh_boundaries(graph, MeshingOptions(size=4.0, effort="fast"), image.materials)
     assert_valid_mesh(mesh, image)
     assert len(edges) == meshing.WISHES + 1

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from faces import areas, assert_valid_faces, grid, polygon_graph, quads_of, valences
-from imgquad_core import finishing, pieces
+from imgquad_core import batches, pieces
 from imgquad_core.boundary import extract_boundaries
 from imgquad_core.meshing import MeshingOptions, mesh_boundaries
 from imgquad_core.model import LabelImage
@@ -170,7 +170,7 @@ def test_a_matrix_in_pieces_has_no_scar(matrix: LabelImage, monkeypatch: pytest.
     assert one.points.tobytes() == two.points.tobytes()
     assert one.quads.tobytes() == two.quads.tobytes()
     assert_valid_mesh(one, matrix)
-    monkeypatch.setattr(finishing, "LARGEST", 10**9)
+    monkeypatch.setattr(batches, "LARGEST", 10**9)
     whole = mesh_boundaries(graph, options)
     assert whole.quads.tobytes() != one.quads.tobytes()
     ours, theirs = quality_report(one), quality_report(whole)
@@ -182,7 +182,7 @@ def test_a_matrix_in_pieces_has_no_scar(matrix: LabelImage, monkeypatch: pytest.
 
 @pytest.mark.parametrize("kind", ["noise", "checkerboard", "speckled", "void"])
 def test_narrow_strips_leave_any_picture_valid(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(finishing, "LARGEST", 30)
+    monkeypatch.setattr(batches, "LARGEST", 30)
     monkeypatch.setattr(pieces, "WIDTH", 4)
     image = label_image(labels_of_kind(kind, 24, 28, 3, 7))
     graph = smooth_boundaries(extract_boundaries(image), SmoothingOptions(size=1.0))
