@@ -292,10 +292,10 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
 
 def _groups_of(graph: BoundaryGraph, faces: Flags, sizes: Points) -> list[Flags]:
     """Return the flagged faces in groups of neighbours (by number) that threads can share, whatever their number."""
-    quads = np.where(faces, graph.region_pixels / sizes**2, 0.0)
+    quads = np.where(faces, np.maximum(graph.region_pixels, 1) / sizes**2, 0.0)
     count = int(np.clip(quads.sum() / GROUP, 1, MOST_GROUPS))
     group = np.floor((np.cumsum(quads) - 0.5 * quads) / quads.sum() * count)
-    return [mine for g in range(count) if (mine := faces & (group == g)).any()]
+    return [faces & (group == g) for g in np.unique(group[faces])]
 
 
 def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
