@@ -56,7 +56,7 @@ def compile_last_stages() -> None:
 
     points, ids = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.arange(4)
     mesh = FaceQuads(points, ids[None, :].copy(), np.zeros(1, np.int64), ids, np.ones(4, np.int64))
-    split_quads(mesh, np.full(4, -1), np.full(4, -1))
+    split_quads(mesh, np.full(4, -1), np.full((4, 1), -1))
     clean_up(mesh, CleanUp((1,), 0.0, 0.0))
     repair(mesh, 2.0)
     rings, none = rings_of(mesh.quads, 4), np.zeros(4, bool)

@@ -25,7 +25,7 @@ from .relaxation import (
     untangle,
 )
 from .repair import repair
-from .splitting import INNER_VALENCE, FaceQuads, middles_of, split_quads
+from .splitting import INNER_VALENCE, FaceQuads, points_between, split_quads
 from .topology import CleanUp, clean_up
 from .triangulation import Constraints
 
@@ -42,7 +42,7 @@ POOR = 0.7  # scaled Jacobian below which single quads are replaced
 
 
 def finished(
-    batches: list[FaceQuads], targets: Points, middles: Constraints | None, how: CleanUp, threads: int
+    batches: list[FaceQuads], targets: Points, pieces: int, rim: Constraints, how: CleanUp, threads: int
 ) -> list[FaceQuads]:
     """Turn composed quads into the final ones of their faces, batch by batch.
 
@@ -52,8 +52,10 @@ def finished(
         Composed quads, from `batches_of`.
     targets : float64, shape (n, 2)
         Where the rim belongs: points of the boundary, by `FaceQuads.origin`.
-    middles : Constraints, optional
-        Points of the boundary between others, where each quad is to be split into four.
+    pieces : int
+        Number of quads, 1, 2 or 3, that each one is split into in both directions after its clean-up.
+    rim : Constraints
+        The rim's edges before that split, with the boundary's points between their ends.
     how : CleanUp
         How far the clean-up goes.
     threads : int
@@ -62,26 +64,26 @@ def finished(
 
     def whole(part: FaceQuads) -> FaceQuads:
         part = clean_up(_relaxed(_fitted(part, targets, False), *DRAFT), how)
-        if middles is not None:  # smoothed while there are a quarter of the nodes
-            part = _halved(_relaxed(part, *FULL), middles)
+        if pieces > 1:  # smoothed while there are few nodes
+            part = _split(_relaxed(part, *FULL), rim, pieces)
         return _without_poor(_relaxed(_fitted(part, targets, True), *last))
 
     def large(part: FaceQuads) -> FaceQuads:
         part = _cleaned_in_pieces(_fitted(part, targets, False), how, threads)
-        if middles is not None:
-            part = _halved(_relaxed_in_pieces(part, *FULL, threads), middles)
+        if pieces > 1:
+            part = _split(_relaxed_in_pieces(part, *FULL, threads), rim, pieces)
         return _relaxed_in_pieces(_fitted(part, targets, True), *last, threads)
 
-    last = FULL if middles is None else AGAIN
+    last = FULL if pieces == 1 else AGAIN
     small = in_threads([part for part in batches if not is_large(part)], whole, threads)
     single = [large(part) for part in batches if is_large(part)]
     return [*small, *in_threads(single, _without_poor, threads)]
 
 
-def _halved(part: FaceQuads, middles: Constraints) -> FaceQuads:
-    """Split every quad into four."""
+def _split(part: FaceQuads, rim: Constraints, pieces: int) -> FaceQuads:
+    """Split every quad into four or nine."""
     twins = twins_of(part.quads, len(part.points))
-    return split_quads(part, twins, middles_of(part.quads, twins, part.origin, middles))
+    return split_quads(part, twins, points_between(part.quads, twins, part.origin, rim, pieces))
 
 
 def _cleaned_in_pieces(face: FaceQuads, how: CleanUp, threads: int) -> FaceQuads:

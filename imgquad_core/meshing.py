@@ -48,7 +48,8 @@ Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
 
 STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
-LEAST_WIDTH = 3.0  # of a face on level 2, in its coarse segments
+LEAST_WIDTHS = {6: 6.0, 4: 3.0}  # by stride: of a face that is meshed so, in its coarse segments
+ENOUGH = 0.7  # worst element from which a face is not tried with a smaller stride
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, at least; groups at most
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
@@ -179,7 +180,7 @@ def mesh_boundaries(
     """
     aside.start()
     options = options or MeshingOptions()
-    graph = with_short_chains_halved(_consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTH)
+    graph = with_short_chains_halved(_consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTHS[4])
     best = _State(graph, [], -1.0)
     parts: list[FaceQuads] = []
     todo, worst = np.ones(len(graph.region_label), bool), np.ones(len(graph.region_label))
@@ -252,25 +253,37 @@ def _consistent(graph: BoundaryGraph, new: Flags) -> BoundaryGraph:
 def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> _Meshed:
     """Mesh flagged faces on their levels."""
     effort = EFFORTS[options.effort]
-    wide = wide_faces(graph, LEAST_WIDTH) & todo
-    coarse = _mesh_wide(graph, wide, effort.wide, options)
-    large = np.zeros(len(todo), bool)
-    for part in coarse.parts:
-        large |= np.bincount(part.face, minlength=len(todo)) > LARGE
-    again = wide & (coarse.worst < np.where(large, min(WORST, effort.again_below), effort.again_below))
-    fine = _mesh_level(graph, todo & ~wide | again, 2, effort.narrow, options)
-    better = fine.faces & ~(wide & (coarse.worst >= fine.worst))
-    parts = _faces_of(coarse.parts, ~better) + _faces_of(fine.parts, better)
-    return _Meshed(parts, todo, np.where(better, fine.worst, coarse.worst))
+    best = _Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -1.0))
+    for stride, width in LEAST_WIDTHS.items():
+        fits = todo & wide_faces(graph, stride, width) & (best.worst < ENOUGH)
+        best = _better(best, _mesh_wide(graph, fits, stride, effort.wide, options))
+    enough = np.where(_large_faces(best), min(WORST, effort.again_below), effort.again_below)
+    return _better(best, _mesh_level(graph, todo & (best.worst < enough), 2, effort.narrow, options))
 
 
-def _mesh_wide(graph: BoundaryGraph, wide: Flags, how: CleanUp, options: MeshingOptions) -> _Meshed:
-    """Mesh faces with stride 4, without those whose chords contradict each other (`wide` is updated)."""
+def _better(one: _Meshed, other: _Meshed) -> _Meshed:
+    """Take each face from where its worst element is better, the first one if none is."""
+    better = other.faces & (other.worst > one.worst)
+    parts = _faces_of(one.parts, ~better) + _faces_of(other.parts, better)
+    return _Meshed(parts, one.faces | other.faces, np.where(better, other.worst, one.worst))
+
+
+def _large_faces(meshed: _Meshed) -> Flags:
+    """Return which faces have so many quads that they are not meshed again for one that is not that bad."""
+    count = np.zeros(len(meshed.faces), np.int64)
+    for part in meshed.parts:
+        count += np.bincount(part.face, minlength=len(count))
+    return np.asarray(count > LARGE)
+
+
+def _mesh_wide(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> _Meshed:
+    """Mesh faces coarsely, without those whose chords contradict each other."""
     while True:
         try:
-            return _mesh_level(graph, wide, 4, how, options)
+            return _mesh_level(graph, faces, stride, how, options)
         except _Conflict as conflict:
-            wide[conflict.regions] = False
+            faces = faces.copy()
+            faces[conflict.regions] = False
 
 
 def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> _Meshed:
@@ -281,11 +294,11 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
     groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
     composed = in_threads(groups, lambda group: batches_of(_compose(graph, group, stride, options)), options.threads)
     aside.wait()
-    edges = coarse_segments(graph, chains_of(graph, faces), 2)
-    nothing = np.zeros(len(edges.tail), np.int64)
-    middles = constraint_table(len(graph.points), edges.tail, edges.head, nothing, nothing, edges.middle)
+    rim = coarse_segments(graph, chains_of(graph, faces), stride // 2)  # the Catmull-Clark split has halved edges
+    nothing = np.zeros(len(rim.tail), np.int64)
+    table = constraint_table(len(graph.points), rim.tail, rim.head, nothing, nothing, rim.middle)
     batches = [batch for group in composed for batch in group]
-    parts = finished(batches, graph.points, middles if stride == 4 else None, how, options.threads)
+    parts = finished(batches, graph.points, stride // 2, table, how, options.threads)
     in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.threads)
     return _Meshed(parts, faces, worst)
 

@@ -1,10 +1,11 @@
-"""The outlines of the faces that are meshed together: every second or fourth point of the boundary chains.
+"""The outlines of the faces that are meshed together: every second, fourth or sixth point of the boundary chains.
 
-A face is meshed one or two levels coarser than its final edges and split once or twice at the end:
+A face is meshed coarser than its final edges. The Catmull-Clark split gives the points +, and where quads are split
+once more at the end, in two or three each way, that gives the others:
 
-    stride 4:  o-----------o       level 2: the split gives + first, then .
-    stride 2:  o-----+-----o       level 1: the split gives .
-    final:     o--.--+--.--o
+    stride 6:  o--.--.--+--.--.--o
+    stride 4:  o--.--+--.--o
+    stride 2:  o--+--o
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clearance import CROSSING, find_conflicts
-from .model import VOID, BoundaryGraph
+from .model import VOID, BoundaryGraph, PointKind
 from .triangulation import Constraints, constraint_table
 
 Ids = NDArray[np.int64]
@@ -31,7 +32,7 @@ class Segments(NamedTuple):
 
     tail: Ids
     head: Ids
-    middle: Ids  #: the point of the graph half-way between
+    middle: Ids  #: (m, 2), the point of the graph half-way between, or the two beside, from tail to head
     chain: Ids
 
 
@@ -52,7 +53,8 @@ def coarse_segments(graph: BoundaryGraph, chains: Flags, stride: int) -> Segment
     nth = np.arange(len(chain)) - np.repeat(np.cumsum(counts) - counts, counts)
     place = graph.chain_offsets[chain] + stride * nth
     ids = graph.chain_points
-    return Segments(ids[place], ids[place + stride], ids[place + stride // 2], chain)
+    middle = np.stack([ids[place + stride // 2], ids[place + (stride + 1) // 2]], axis=1)
+    return Segments(ids[place], ids[place + stride], middle, chain)
 
 
 def chains_of(graph: BoundaryGraph, faces: Flags) -> Flags:
@@ -71,20 +73,31 @@ def outline(graph: BoundaryGraph, faces: Flags, stride: int) -> Outline:
     return Outline(graph.points[ids], ids, np.stack([tail, head], axis=1), table)
 
 
-def wide_faces(graph: BoundaryGraph, least_width: float) -> Flags:
-    """Return which faces can be meshed at stride 4: edges divisible by 4, no conflict of chords, wide enough.
+def wide_faces(graph: BoundaryGraph, stride: int, least_width: float) -> Flags:
+    """Return which faces can be meshed at a stride: edges divisible by it, no conflict of chords, wide enough.
 
-    The width of a face is four times its area over its outline, in lengths of its stride-4 segments.
+    The width of a face is four times its area over its outline, in lengths of its segments.
     """
-    fits = _edges(graph) % 4 == 0
-    segments = coarse_segments(graph, fits, 4)
+    fits = (_edges(graph) % stride == 0) & ~_cut_corners(graph, stride)
+    segments = coarse_segments(graph, fits, stride)
     length = np.hypot(*(graph.points[segments.head] - graph.points[segments.tail]).T)
-    fits &= ~chains_in_conflict(graph, segments, np.ones(graph.n_chains, bool))
     wide = _width(graph, segments, length) >= least_width
+    if not wide.any():
+        return wide
+    fits &= ~chains_in_conflict(graph, segments, np.ones(graph.n_chains, bool))
     for side in (0, 1):
         at = graph.chain_regions[:, side]
         wide[at[(at >= 0) & ~fits]] = False
-    return wide & (_per_face(graph, _edges(graph) // 4) >= 4)
+    return wide & (_per_face(graph, _edges(graph) // stride) >= 4)
+
+
+def _cut_corners(graph: BoundaryGraph, stride: int) -> Flags:
+    """Return which chains have a corner between two points of their coarse segments."""
+    chain = _chain_of_places(graph)
+    nth = np.arange(len(chain)) - graph.chain_offsets[chain]
+    bad = np.zeros(graph.n_chains, bool)
+    bad[chain[(nth % stride != 0) & (graph.point_kind[graph.chain_points] == PointKind.CORNER)]] = True
+    return bad
 
 
 def with_short_chains_halved(graph: BoundaryGraph, least_width: float) -> BoundaryGraph:

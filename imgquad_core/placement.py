@@ -21,6 +21,7 @@ from imgquad_core.jit import kernel, verb
 
 _LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
 _COARSE = 0.6  # mean size over asked size from which that is of use
+_VERY_LONG = 30.0  # coarse segments from which their number is a multiple of six, for two or three times coarser ones
 _SWEEPS = 3
 
 
@@ -97,7 +98,8 @@ def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, le
     total = 0.5 * (cost[end] - cost[begin])
     length = curves.arc[end] - curves.arc[begin]
     if total > _LONG and length > 2 * _COARSE * total * limit[begin]:
-        return max(2 * int(0.5 * total + 0.5), 2 * ((least + 1) // 2))
+        step = 6 if total > _VERY_LONG else 2
+        return max(step * int(total / step + 0.5), step * ((least + step - 1) // step))
     return max(int(np.ceil(total - 0.3)), least)
 
 

@@ -1,4 +1,4 @@
-"""The Catmull-Clark split, which makes all cells quads, and the split of every quad into four.
+"""The Catmull-Clark split, which makes all cells quads, and the split of every quad into four or nine.
 
          c                c--n--b           mid-points on edges, one point in the middle of each cell:
         / \\               |  |  |           a triangle gives three quads, a quad gives four
@@ -114,8 +114,8 @@ def _split_composed(
     return new_points[:count].copy(), quads[:n_quads].copy(), owner[:n_quads].copy(), origin[:count].copy(), mid
 
 
-def split_quads(mesh: FaceQuads, twins: Ids, middle: Ids) -> FaceQuads:
-    """Split every quad into four.
+def split_quads(mesh: FaceQuads, twins: Ids, between: Ids) -> FaceQuads:
+    """Split every quad into n x n.
 
     Parameters
     ----------
@@ -123,61 +123,84 @@ def split_quads(mesh: FaceQuads, twins: Ids, middle: Ids) -> FaceQuads:
         Quads.
     twins : int64, shape (4 n_quads,)
         Opposite half-edges, -1 on the rim.
-    middle : int64, shape (4 n_quads,)
-        Id in the boundary graph of the point that lies between the ends of each rim half-edge.
+    between : int64, shape (4 n_quads, n - 1)
+        Ids in the boundary graph of the points that lie on the way along each rim half-edge.
     """
-    points, quads, origin = _split_quads(mesh.points, mesh.quads, twins, middle)
+    points, quads, origin = _split_quads(mesh.points, mesh.quads, twins, between)
     n = len(mesh.points)
     origin[:n] = mesh.origin
     wanted = np.full(len(points), INNER_VALENCE, np.int64)
     wanted[:n] = mesh.wanted
     wanted[n:][origin[n:] >= 0] = 2
-    return FaceQuads(points, quads, np.repeat(mesh.face, 4), origin, wanted)
+    return FaceQuads(points, quads, np.repeat(mesh.face, (between.shape[1] + 1) ** 2), origin, wanted)
 
 
 @kernel
-def _split_quads(points: Points, quads: Ids, twins: Ids, middle: Ids) -> tuple[Points, Ids, Ids]:
-    """Return points, quads (four for each one, beginning at its corners) and origin of the new points."""
-    n, n_quads = len(points), len(quads)
-    new_points = np.empty((n + 5 * n_quads, 2))
-    for v in range(n):
+def _split_quads(points: Points, quads: Ids, twins: Ids, between: Ids) -> tuple[Points, Ids, Ids]:
+    """Return points, quads (n x n for each one, row by row) and origin of the new points.
+
+    d--.--.--c
+    |  |  |  |
+    .--.--.--.       the lattice of a quad: row 0 from a to b, row n from d to c
+    |  |  |  |
+    a--.--.--b
+    """
+    n = between.shape[1] + 1
+    n_old, capacity = len(points), len(points) + len(quads) * (n - 1) * (n + 3)
+    new_points, origin = np.empty((capacity, 2)), np.full(capacity, -1, np.int64)
+    for v in range(n_old):
         new_points[v, 0], new_points[v, 1] = points[v, 0], points[v, 1]
-    origin = np.full(n + 5 * n_quads, -1, np.int64)
-    mid = np.full(4 * n_quads, -1, np.int64)
-    flat = quads.ravel()
-    count = n
-    for h in range(4 * n_quads):
-        if mid[h] < 0:
-            a, b = flat[h], flat[h - h % 4 + (h % 4 + 1) % 4]
-            new_points[count, 0] = 0.5 * (points[a, 0] + points[b, 0])
-            new_points[count, 1] = 0.5 * (points[a, 1] + points[b, 1])
-            mid[h] = count
-            if twins[h] >= 0:
-                mid[twins[h]] = count
-            else:
-                origin[count] = middle[h]
-            count += 1
-    new_quads = np.empty((4 * n_quads, 4), np.int64)
-    for q in range(n_quads):
-        new_points[count, 0] = 0.25 * (
-            points[quads[q, 0], 0] + points[quads[q, 1], 0] + points[quads[q, 2], 0] + points[quads[q, 3], 0]
-        )
-        new_points[count, 1] = 0.25 * (
-            points[quads[q, 0], 1] + points[quads[q, 1], 1] + points[quads[q, 2], 1] + points[quads[q, 3], 1]
-        )
+    first = np.full(4 * len(quads), -1, np.int64)  # new point next to the tail of each half-edge
+    step = np.ones(4 * len(quads), np.int64)  # from it to the next one
+    new_quads = np.empty((n * n * len(quads), 4), np.int64)
+    lattice = np.empty((n + 1, n + 1), np.int64)
+    count = n_old
+    for q in range(len(quads)):
         for k in range(4):
-            new_quads[4 * q + k, 0] = quads[q, k]
-            new_quads[4 * q + k, 1] = mid[4 * q + k]
-            new_quads[4 * q + k, 2] = count
-            new_quads[4 * q + k, 3] = mid[4 * q + (k + 3) % 4]
-        count += 1
+            h = 4 * q + k
+            if first[h] >= 0:
+                continue
+            u, w = quads[q, k], quads[q, (k + 1) & 3]
+            first[h] = count
+            if twins[h] >= 0:
+                first[twins[h]], step[twins[h]] = count + n - 2, -1
+            for i in range(1, n):
+                s = i / n
+                new_points[count, 0] = (1.0 - s) * points[u, 0] + s * points[w, 0]
+                new_points[count, 1] = (1.0 - s) * points[u, 1] + s * points[w, 1]
+                if twins[h] < 0:
+                    origin[count] = between[h, i - 1]
+                count += 1
+        a, b, c, d = quads[q, 0], quads[q, 1], quads[q, 2], quads[q, 3]
+        lattice[0, 0], lattice[0, n], lattice[n, n], lattice[n, 0] = a, b, c, d
+        for i in range(1, n):
+            lattice[0, i] = first[4 * q] + step[4 * q] * (i - 1)
+            lattice[i, n] = first[4 * q + 1] + step[4 * q + 1] * (i - 1)
+            lattice[n, n - i] = first[4 * q + 2] + step[4 * q + 2] * (i - 1)
+            lattice[n - i, 0] = first[4 * q + 3] + step[4 * q + 3] * (i - 1)
+        for j in range(1, n):
+            for i in range(1, n):
+                s, t = i / n, j / n
+                for axis in range(2):
+                    low = (1.0 - s) * points[a, axis] + s * points[b, axis]
+                    high = (1.0 - s) * points[d, axis] + s * points[c, axis]
+                    new_points[count, axis] = (1.0 - t) * low + t * high
+                lattice[j, i] = count
+                count += 1
+        for j in range(n):
+            for i in range(n):
+                new = (q * n + j) * n + i
+                new_quads[new, 0], new_quads[new, 1] = lattice[j, i], lattice[j, i + 1]
+                new_quads[new, 2], new_quads[new, 3] = lattice[j + 1, i + 1], lattice[j + 1, i]
     return new_points[:count].copy(), new_quads, origin[:count].copy()
 
 
-def middles_of(quads: Ids, twins: Ids, origin: Ids, table: Constraints) -> Ids:
-    """Look up the boundary point between the ends of each rim half-edge; -1 inside."""
-    middle = np.full(twins.size, -1, np.int64)
+def points_between(quads: Ids, twins: Ids, origin: Ids, table: Constraints, n: int) -> Ids:
+    """Look up the n - 1 boundary points on the way along each rim half-edge, for n of 2 or 3; -1 inside."""
+    between = np.full((twins.size, n - 1), -1, np.int64)
     rim = np.flatnonzero(twins < 0)
-    place = find_edges(table, origin[quads[rim >> 2, rim & 3]], origin[quads[rim >> 2, (rim + 1) & 3]])
-    middle[rim[place >= 0]] = table.middle[place[place >= 0]]
-    return middle
+    tail, head = origin[quads[rim >> 2, rim & 3]], origin[quads[rim >> 2, (rim + 1) & 3]]
+    for at, (u, w) in enumerate(((tail, head), (head, tail))[: n - 1]):
+        place = find_edges(table, u, w)
+        between[rim[place >= 0], at] = table.middle[place[place >= 0]]
+    return between

@@ -24,7 +24,7 @@ class Constraints(NamedTuple):
     offsets: Ids  #: (n_points + 1,)
     head: Ids  #: second point of each directed edge
     region: Ids  #: region on its left, -1 for none
-    middle: Ids  #: what the caller keeps for each segment: id of the point that will lie between its ends
+    middle: Ids  #: id of the point that will lie half-way, or of the first of two that will lie between its ends
 
 
 class Triangles(NamedTuple):
@@ -36,7 +36,10 @@ class Triangles(NamedTuple):
 
 
 def constraint_table(n_points: int, tail: Ids, head: Ids, left: Ids, right: Ids, middle: Ids) -> Constraints:
-    """Group segments ``tail -> head`` with the regions on both sides as directed edges by their first point."""
+    """Group segments ``tail -> head`` with the regions on both sides as directed edges by their first point.
+
+    `middle`, of shape (n_segments, 2), is what the caller keeps of each direction.
+    """
     first = np.concatenate([tail, head])
     order = np.argsort(first, kind="stable")
     offsets = np.zeros(n_points + 1, np.int64)
@@ -45,7 +48,7 @@ def constraint_table(n_points: int, tail: Ids, head: Ids, left: Ids, right: Ids,
         offsets,
         np.concatenate([head, tail])[order],
         np.concatenate([left, right])[order],
-        np.concatenate([middle, middle])[order],
+        np.concatenate([middle[:, 0], middle[:, 1]])[order],
     )
 
 
