@@ -1,9 +1,9 @@
-"""From boundaries to quads: the paper's step 4, face by face on two levels.
+"""From boundaries to quads: the paper's step 4, face by face on levels.
 
 Every face (region) is meshed alone; faces meet in the points of the boundary, so they fit whatever their level. A
-wide face is meshed and cleaned up two levels coarser than its final edges (an irregular node stays one node while
-nodes become sixteen times as many), others one level coarser. A face whose worst element is poor is meshed again one
-level finer, and the better mesh is kept.
+wide face is meshed and cleaned up with a stride of four final edges (an irregular node stays one node while nodes
+become sixteen times as many), with effort "best" a very wide one with a stride of six, others with one of two. A face
+whose worst element is poor is meshed again with the next smaller stride, and the better mesh is kept.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from .outline import (
     chains_of,
     coarse_segments,
     halved,
+    mean_edges,
     outline,
     refined,
     wide_faces,
@@ -48,8 +49,10 @@ Ids = NDArray[np.int64]
 Points = NDArray[np.float64]
 
 STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
-LEAST_WIDTHS = {6: 6.0, 4: 3.0}  # by stride: of a face that is meshed so, in its coarse segments
-ENOUGH = 0.7  # worst element from which a face is not tried with a smaller stride
+LEAST_WIDTH = 3.0  # of a face that is meshed on stride 4, in its coarse segments
+VERY_WIDE = 6.0  # the same on stride 6
+EVEN = 0.8  # of the size inside, mean edge around a face at stride 6: its size hardly grows from the rim inwards
+ENOUGH = 0.65  # worst element from which a face is not tried with a smaller stride
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, at least; groups at most
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
@@ -68,12 +71,15 @@ class Effort(NamedTuple):
     narrow: CleanUp  #: clean-up of faces on level 1
     again_below: float  #: a face on level 2 with a worse element is meshed on level 1 as well
     slides: int  #: rounds in which boundary nodes slide along their chains
+    in_nine: bool = False  #: whether very wide faces are meshed on stride 6 and their quads split in nine
 
 
 EFFORTS: Mapping[str, Effort] = {
     "fast": Effort(CleanUp((16, 40), 0.2, 0.6), CleanUp((16,), 0.2, 0.6), 0.4, 0),
     "normal": Effort(CleanUp((40, 160), 0.5, 0.6), CleanUp((16, 40, 80), 0.5, 0.6), 0.5, 2),
-    "best": Effort(CleanUp((16, 40, 80, 160, 160), 0.8, 0.6, 160), CleanUp((16, 40, 80, 160), 1.0, 0.6, 160), 0.5, 4),
+    "best": Effort(
+        CleanUp((16, 40, 80, 160, 160), 0.8, 0.6, 160), CleanUp((16, 40, 80, 160), 1.0, 0.6, 160), 0.5, 4, True
+    ),
 }
 
 
@@ -180,7 +186,7 @@ def mesh_boundaries(
     """
     aside.start()
     options = options or MeshingOptions()
-    graph = with_short_chains_halved(_consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTHS[4])
+    graph = with_short_chains_halved(_consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTH)
     best = _State(graph, [], -1.0)
     parts: list[FaceQuads] = []
     todo, worst = np.ones(len(graph.region_label), bool), np.ones(len(graph.region_label))
@@ -254,9 +260,11 @@ def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> _
     """Mesh flagged faces on their levels."""
     effort = EFFORTS[options.effort]
     best = _Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -1.0))
-    for stride, width in LEAST_WIDTHS.items():
-        fits = todo & wide_faces(graph, stride, width) & (best.worst < ENOUGH)
-        best = _better(best, _mesh_wide(graph, fits, stride, effort.wide, options))
+    if effort.in_nine:
+        even = mean_edges(graph) > EVEN * options.face_sizes(graph.region_label)
+        best = _better(best, _mesh_wide(graph, todo & wide_faces(graph, 6, VERY_WIDE) & even, 6, effort.wide, options))
+    wide = todo & wide_faces(graph, 4, LEAST_WIDTH) & (best.worst < ENOUGH)
+    best = _better(best, _mesh_wide(graph, wide, 4, effort.wide, options))
     enough = np.where(_large_faces(best), min(WORST, effort.again_below), effort.again_below)
     return _better(best, _mesh_level(graph, todo & (best.worst < enough), 2, effort.narrow, options))
 

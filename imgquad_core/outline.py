@@ -143,6 +143,14 @@ def chains_in_conflict(graph: BoundaryGraph, segments: Segments, new: Flags) -> 
     return bad
 
 
+def mean_edges(graph: BoundaryGraph) -> Points:
+    """Return the mean length of the final edges around each face."""
+    ends = coarse_segments(graph, np.ones(graph.n_chains, bool), 1)
+    length = np.hypot(*(graph.points[ends.head] - graph.points[ends.tail]).T)
+    around, count = (np.bincount(ends.chain, weights, graph.n_chains) for weights in (length, None))
+    return np.asarray(_per_face(graph, around) / np.maximum(_per_face(graph, count), 1))
+
+
 def _width(graph: BoundaryGraph, segments: Segments, length: Points) -> Points:
     """Return the width of each face in lengths of its segments."""
     around = _per_face(graph, np.bincount(segments.chain, length, graph.n_chains))

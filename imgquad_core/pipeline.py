@@ -17,7 +17,7 @@ from . import aside
 from .boundary import ExtractionOptions, extract_boundaries
 from .denoise import DenoiseOptions, Removal, automatic_limits, list_removed, remove_noise
 from .errors import InputError
-from .meshing import MeshingOptions, mesh_boundaries
+from .meshing import EFFORTS, MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .periodic import DIRECTIONS, match_opposite_sides, rematch
 from .reading import Picture, ReadOptions, read_picture
@@ -107,8 +107,8 @@ class MeshOptions:
         if self.periodic not in ("none", *DIRECTIONS):
             raise InputError(f"periodic is '{self.periodic}': give none, x, y or xy")
         # each stage checks its own options: now, not after minutes of work
-        self.smoothing(None)
         self.meshing(None)
+        self.smoothing(None)
         self.segmentation()
         self.noise(True, (1, 1))
         ReadOptions(self.max_pixels, self.frame)
@@ -138,6 +138,7 @@ class MeshOptions:
             edge_ratio=self.edge_ratio,
             max_shift=self.max_shift,
             material_sizes=self._sizes(materials),
+            in_twelves=EFFORTS[self.effort].in_nine,
         )
 
     def meshing(self, materials: Materials | None) -> MeshingOptions:

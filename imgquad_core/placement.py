@@ -21,7 +21,7 @@ from imgquad_core.jit import kernel, verb
 
 _LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
 _COARSE = 0.6  # mean size over asked size from which that is of use
-_VERY_LONG = 30.0  # coarse segments from which their number is a multiple of six, for two or three times coarser ones
+_VERY_LONG = 30.0  # coarse segments from which their number may be made a multiple of six
 _SWEEPS = 3
 
 
@@ -35,7 +35,13 @@ class Placement(NamedTuple):
 
 @kernel
 def place_nodes(
-    curves: Curves, size: Floats, limit: Floats, is_corner: Flags, at_least: Ints, exact: Flags
+    curves: Curves,
+    size: Floats,
+    limit: Floats,
+    is_corner: Flags,
+    at_least: Ints,
+    exact: Flags,
+    in_twelves: bool,
 ) -> Placement:
     """Place the final nodes on every chain.
 
@@ -51,6 +57,8 @@ def place_nodes(
         Least number of coarse segments of each chain.
     exact : bool, shape (n_chains,)
         Chains that get a coarse node at every dense point.
+    in_twelves : bool
+        Whether very long pieces get a multiple of twelve final edges.
 
     Returns
     -------
@@ -83,7 +91,7 @@ def place_nodes(
             if i < last and not is_corner[i] and not exact[c]:
                 continue
             least = -(-at_least[c] // pieces)
-            number = 1 if exact[c] else _count(curves, cost, limit, begin, i, least)
+            number = 1 if exact[c] else _count(curves, cost, limit, begin, i, least, in_twelves)
             _divide(cost, begin, i, 2 * number, at, n)
             n += 2 * number
             corner[n] = is_corner[i]
@@ -93,12 +101,12 @@ def place_nodes(
 
 
 @verb
-def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, least: int) -> int:
+def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, least: int, in_twelves: bool) -> int:
     """Choose the number of coarse segments of a piece."""
     total = 0.5 * (cost[end] - cost[begin])
     length = curves.arc[end] - curves.arc[begin]
     if total > _LONG and length > 2 * _COARSE * total * limit[begin]:
-        step = 6 if total > _VERY_LONG else 2
+        step = 6 if in_twelves and total > _VERY_LONG else 2
         return max(step * int(total / step + 0.5), step * ((least + step - 1) // step))
     return max(int(np.ceil(total - 0.3)), least)
 

@@ -50,6 +50,9 @@ class SmoothingOptions:
         How far a point of the boundary moves at most, in pixels.
     material_sizes : mapping of int to float
         Length of final edges per material label; a boundary takes the least of its two sides'.
+    in_twelves : bool
+        Whether very long pieces between corners get a multiple of twelve edges, up to 10 % longer or shorter than
+        asked: the quads of very wide faces can then be split in nine.
     """
 
     size: float = 4.0
@@ -58,6 +61,7 @@ class SmoothingOptions:
     edge_ratio: float = 1.2
     max_shift: float = 1.0
     material_sizes: Mapping[int, float] | None = None
+    in_twelves: bool = False
 
     def __post_init__(self) -> None:
         sizes = {"size": self.size, "boundary_size": self.boundary_size or self.size}
@@ -103,7 +107,7 @@ def smooth_boundaries(
     smooth = _smooth(curves, node, is_corner, room)
     if shape is not None:
         graph, curves, ends, node, smooth = stretch(graph, curves, ends, node, smooth, shape)
-    draft = Draft(curves, ends, smooth, node, is_corner, limit, options.edge_ratio, graph.shape)
+    draft = Draft(curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.in_twelves, graph.shape)
     size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, graph.shape)
     nodes, gently = place_freely(draft, size)
     nodes = restore_areas_freely(graph, draft, nodes, room, options.max_shift, gently)

@@ -136,6 +136,7 @@ _OWN: Mapping[str, Callable[[Any, str], Any]] = {
     "drop": _materials,
     "materials": _materials,
     "sample": _names,
+    "in_twelves": _flag,
     "progress_bar": _flag,
     "unit": lambda value, name: _choice(value, name, UNITS),
 }

@@ -203,6 +203,7 @@ def smooth(
     growth: float = 1.3,
     edge_ratio: float = 1.2,
     max_shift: float = 1.0,
+    in_twelves: bool = False,
     periodic: Periodic = "none",
     unit: Unit = "pixels",
     progress_bar: bool = False,
@@ -227,6 +228,9 @@ def smooth(
         Largest ratio of the lengths of neighbouring edges on a boundary.
     max_shift : float, default: 1.0
         How far a boundary moves at most, always in pixels.
+    in_twelves : bool, default: False
+        Very long boundaries get a multiple of twelve edges, up to 10 % off the size: with effort "best" the quads of
+        very wide regions are then split in nine.
     periodic : "none" | "x" | "y" | "xy", default: "none"
         Opposite sides get nodes at the same places, for a periodic cell.
     unit : "pixels" | "world", default: "pixels"
@@ -244,7 +248,7 @@ def smooth(
     from imgquad_mesh.checks import checked
     from imgquad_mesh.stages import smoothed
 
-    values = checked(growth=growth, edge_ratio=edge_ratio, max_shift=max_shift)
+    values = checked(growth=growth, edge_ratio=edge_ratio, max_shift=max_shift, in_twelves=in_twelves)
     sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
     repeat = checked(periodic=periodic)["periodic"]
     given = from_lines(lines)

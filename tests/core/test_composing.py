@@ -189,7 +189,7 @@ def cut_of_triangles(points: Points, triangles: Ids) -> CutMesh:
     rim = np.flatnonzero(twins == -1)
     tail, head = triangles.ravel()[rim], np.roll(triangles, -1, axis=1).ravel()[rim]
     nothing = np.zeros(len(rim), np.int64)
-    table = constraint_table(len(points), tail, head, nothing, nothing - 1, nothing)
+    table = constraint_table(len(points), tail, head, nothing, nothing - 1, np.stack([nothing, nothing], axis=1))
     cut = cut_at_constraints(Triangles(points, triangles, twins), table)
     assert not isinstance(cut, FaceConflict)
     return cut
@@ -227,7 +227,9 @@ def test_lattice_is_composed_to_its_squares() -> None:
     inner = squares.points[squares.origin < 0]
     flat = triangulate(np.vstack([graph.points, inner]), np.array(graph.segments))
     n = np.zeros(graph.segments.shape[0], np.int64)
-    table = constraint_table(len(graph.points), graph.segments[:, 0], graph.segments[:, 1], n, n - 1, n)
+    table = constraint_table(
+        len(graph.points), graph.segments[:, 0], graph.segments[:, 1], n, n - 1, np.stack([n, n], axis=1)
+    )
     cut = cut_at_constraints(flat, table)
     assert not isinstance(cut, FaceConflict)
     quads = pairs_of(cut, compose(cut))

@@ -21,7 +21,7 @@ def two_squares(left: int = 0, right: int = 1) -> CutMesh | FaceConflict:
     tail, head = np.array([0, 1, 2, 3, 4, 5, 1]), np.array([1, 2, 3, 4, 5, 0, 4])
     at_left = np.array([left, right, right, right, left, left, left])
     at_right = np.array([VOID] * 6 + [right])
-    table = constraint_table(6, tail, head, at_left, at_right, np.arange(7))
+    table = constraint_table(6, tail, head, at_left, at_right, np.arange(14).reshape(7, 2) // 2)
     return cut_at_constraints(triangulate(points, np.stack([tail, head], axis=1)), table)
 
 
@@ -66,7 +66,9 @@ def test_face_without_region_is_dropped() -> None:
 def test_outlines_that_name_two_regions_for_one_face_are_a_conflict() -> None:
     points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     tail = np.arange(4)
-    table = constraint_table(4, tail, (tail + 1) % 4, np.array([2, 2, 5, 2]), np.full(4, VOID), np.arange(4))
+    table = constraint_table(
+        4, tail, (tail + 1) % 4, np.array([2, 2, 5, 2]), np.full(4, VOID), np.zeros((4, 2), np.int64)
+    )
     cut = cut_at_constraints(triangulate(points, np.stack([tail, (tail + 1) % 4], axis=1)), table)
     assert isinstance(cut, FaceConflict)
     assert cut.regions.tolist() == [2, 5]

@@ -15,6 +15,7 @@ from imgquad_core.boundary import extract_boundaries
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.meshing import EFFORTS, MeshingOptions, mesh_boundaries
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind, QuadMesh
+from imgquad_core.quality import quality_report
 from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.splitting import FaceQuads
 from invariants import assert_valid_mesh
@@ -138,6 +139,21 @@ def test_of_the_rounds_that_halve_edges_the_best_one_counts(best: int, monkeypat
     assert len(edges) == meshing.WISHES + 1
     assert len(np.unique(mesh.chain_points)) == edges[best]
     assert len(set(edges)) == len(edges)
+
+
+def test_very_wide_faces_are_split_in_nine_with_the_most_effort(monkeypatch: pytest.MonkeyPatch) -> None:
+    image = label_image(disc(50, (110, 110), 220))
+    graph = boundaries(image, 2.0, in_twelves=True)
+    options = MeshingOptions(size=2.0, effort="best")
+    nine = mesh_boundaries(graph, options, image.materials)
+    assert_valid_mesh(nine, image)
+    monkeypatch.setattr(meshing, "VERY_WIDE", np.inf)
+    four = mesh_boundaries(graph, options, image.materials)
+    ours, theirs = quality_report(nine), quality_report(four)
+    assert ours.irregular < 0.8 * theirs.irregular
+    assert ours.mean_sj > theirs.mean_sj - 0.003
+    assert min(ours.min_sj, theirs.min_sj) > 0.7
+    assert ours.n_quads == pytest.approx(theirs.n_quads, rel=0.03)
 
 
 def test_boundary_nodes_on_the_frame_stay_on_it() -> None:

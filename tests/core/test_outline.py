@@ -1,7 +1,8 @@
-"""Coarse outlines of faces: every second or fourth point, and which faces stand the coarsest."""
+"""Coarse outlines of faces: every second, fourth or sixth point, and which faces stand the coarsest."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -29,14 +30,16 @@ def split_square(edges: int, bulge: float = 0.0) -> BoundaryGraph:
     return graph_of(points, chains, [(1, VOID), (0, VOID), (0, 1)], (32, 32))
 
 
-@pytest.mark.parametrize("stride", [2, 4])
+@pytest.mark.parametrize("stride", [2, 3, 4, 6])
 def test_segments_span_stride_edges_and_know_their_middle(stride: int) -> None:
-    graph = halved(voronoi_graph(64, 3, 4.0, 0), np.ones(voronoi_graph(64, 3, 4.0, 0).n_chains, bool))
+    graph = polygon_graph(SQUARE, [12, 24, 12, 36], (32, 32))
     segments = coarse_segments(graph, everything(graph), stride)
     expected = []
     for c in range(graph.n_chains):
         ids = graph.chain(c).tolist()
-        expected += [(ids[i], ids[i + stride], ids[i + stride // 2], c) for i in range(0, len(ids) - stride, stride)]
+        for i in range(0, len(ids) - stride, stride):
+            middle = [ids[i + stride // 2], ids[i + (stride + 1) // 2]]
+            expected.append((ids[i], ids[i + stride], middle, c))
     assert list(zip(*(a.tolist() for a in segments), strict=True)) == expected
     assert len(expected) == len(graph.segments) // stride
 
@@ -79,23 +82,37 @@ def test_outline_keeps_ids_and_names_other_faces_void() -> None:
 
 def test_wide_face_needs_width_and_multiples_of_four() -> None:
     wide = polygon_graph(SQUARE, [16] * 4, (32, 32))
-    assert wide_faces(wide, 3.0).tolist() == [True]
-    assert wide_faces(wide, 30.0).tolist() == [False]
-    assert wide_faces(polygon_graph(SQUARE, [16, 16, 16, 14], (32, 32)), 3.0).tolist() == [False]
-    assert wide_faces(polygon_graph(SQUARE, [2] * 4, (32, 32)), 0.1).tolist() == [False]  # two segments only
+    assert wide_faces(wide, 4, 3.0).tolist() == [True]
+    assert wide_faces(wide, 4, 30.0).tolist() == [False]
+    assert wide_faces(polygon_graph(SQUARE, [16, 16, 16, 14], (32, 32)), 4, 3.0).tolist() == [False]
+    assert wide_faces(polygon_graph(SQUARE, [2] * 4, (32, 32)), 4, 0.1).tolist() == [False]  # two segments only
     narrow = polygon_graph([[0, 0], [32, 0], [32, 2], [0, 2]], [32, 4, 32, 4], (2, 32))
-    assert wide_faces(narrow, 3.0).tolist() == [False]
+    assert wide_faces(narrow, 4, 3.0).tolist() == [False]
 
 
 @pytest.mark.parametrize(("edges", "expected"), [(16, True), (14, False)])
 def test_chain_of_other_lengths_bars_both_faces_beside_it(edges: int, expected: bool) -> None:
-    assert wide_faces(split_square(edges), 1.0).tolist() == [expected] * 2
+    assert wide_faces(split_square(edges), 4, 1.0).tolist() == [expected] * 2
+
+
+def test_very_wide_face_needs_multiples_of_six() -> None:
+    assert wide_faces(polygon_graph(SQUARE, [36] * 4, (32, 32)), 6, 6.0).tolist() == [True]
+    assert wide_faces(polygon_graph(SQUARE, [36, 36, 36, 40], (32, 32)), 6, 6.0).tolist() == [False]
+    assert wide_faces(polygon_graph(SQUARE, [30] * 4, (32, 32)), 6, 6.0).tolist() == [False]
+
+
+@pytest.mark.parametrize(("at", "expected"), [(12, True), (14, False)])
+def test_corner_within_a_segment_bars_its_face(at: int, expected: bool) -> None:
+    graph = polygon_graph(SQUARE, [36] * 4, (32, 32))
+    kind = graph.point_kind.copy()
+    kind[graph.chain(0)[at]] = PointKind.CORNER
+    assert wide_faces(replace(graph, point_kind=kind), 4, 3.0).tolist() == [expected]
 
 
 def test_chords_that_would_cross_bar_their_faces() -> None:
     # an island within the bulge of the chain: on the other side of the chain's chords
     bulging = split_square(8, 6.0)
-    assert wide_faces(bulging, 0.5).tolist() == [True, True]
+    assert wide_faces(bulging, 4, 0.5).tolist() == [True, True]
     island = np.array(
         [[21.0, 16], [20.6, 16.7], [20, 17], [19.4, 16.7], [19, 16], [19.4, 15.3], [20, 15], [20.6, 15.3]]
     )
@@ -104,7 +121,7 @@ def test_chords_that_would_cross_bar_their_faces() -> None:
     chains = [bulging.chain(c).tolist() for c in range(3)] + [[*range(n, n + 8), n]]
     regions = [*map(tuple, bulging.chain_regions.tolist()), (2, 0)]
     graph = graph_of(points, chains, regions, (32, 32))
-    assert not wide_faces(graph, 0.5)[:2].any()
+    assert not wide_faces(graph, 4, 0.5)[:2].any()
 
 
 def test_halved_chains_gain_mid_points_behind_all_others() -> None:

@@ -99,7 +99,7 @@ def test_hopeless_curves_fall_back_to_the_pixel_boundary(
     wild = np.clip(wild, 0.0, 14.0)
     wild[per_point(curves, curves.is_frame)] = curves.raw[per_point(curves, curves.is_frame)]
     limit, nowhere = np.full(len(wild), size), np.zeros(len(wild), bool)
-    draft = resolving.Draft(curves, ends, wild, ends.place, nowhere, limit, 1.2, raw.shape)
+    draft = resolving.Draft(curves, ends, wild, ends.place, nowhere, limit, 1.2, False, raw.shape)
     nodes, _ = resolving.place_freely(draft, limit)
     graph = replace(
         raw,
@@ -220,6 +220,18 @@ def test_a_material_and_the_boundary_have_sizes_of_their_own() -> None:
     assert interface(fine)[1].mean() == pytest.approx(2.0, rel=0.1)
     assert edge_lengths(fine).max() > 5
     assert interface(smoothed(labels, 8.0, boundary_size=3.0))[1].mean() == pytest.approx(3.0, rel=0.1)
+
+
+@pytest.mark.parametrize("radius", [10.0, 31.5, 33.0, 35.2, 37.0, 60.0])
+def test_very_long_pieces_get_a_multiple_of_twelve_edges_if_asked(radius: float) -> None:
+    labels = disc(radius, (64.2, 63.9), 128)
+    free, length = (interface(smoothed(labels, 3.0, in_twelves=asked))[1] for asked in (False, True))
+    if radius == 10.0:
+        assert np.array_equal(free, length)
+    else:
+        assert len(length) % 12 == 0
+        assert len(length) == pytest.approx(len(free), rel=0.1)
+        assert length.max() < 1.25 * length.min()
 
 
 def test_a_thin_line_gets_edges_of_its_width() -> None:

@@ -11,6 +11,7 @@ from faces import (
     assert_valid_faces,
     grid,
     irregularity,
+    polygon_graph,
     quads_of,
     valences,
     voronoi_graph,
@@ -20,7 +21,7 @@ from imgquad_core.composing import compose
 from imgquad_core.halfedge import twins_of
 from imgquad_core.model import BoundaryGraph
 from imgquad_core.outline import coarse_segments, halved
-from imgquad_core.splitting import FaceQuads, middles_of, split_composed, split_quads
+from imgquad_core.splitting import FaceQuads, points_between, split_composed, split_quads
 from imgquad_core.triangulation import constraint_table
 
 
@@ -69,53 +70,68 @@ def even_graph(seed: int) -> BoundaryGraph:
     return halved(graph, np.ones(graph.n_chains, bool))
 
 
-def once_more(mesh: FaceQuads) -> FaceQuads:
+def in_parts(mesh: FaceQuads, n: int) -> FaceQuads:
+    """Split with ids 1000 + 10 h + i for the points on the way along each rim half-edge h."""
     twins = twins_of(mesh.quads, len(mesh.points))
-    rim = np.where(twins < 0, 1000 + np.arange(twins.size), -1)
-    return split_quads(mesh, twins, rim)
+    ids = 1000 + 10 * np.arange(twins.size)[:, None] + np.arange(n - 1)
+    return split_quads(mesh, twins, np.where(twins[:, None] < 0, ids, -1))
 
 
-def test_split_of_quads_adds_no_irregular_node() -> None:
+@pytest.mark.parametrize("n", [2, 3])
+def test_split_of_quads_adds_no_irregular_node(n: int) -> None:
     mesh = quads_of(even_graph(2), 2.0, 4)
-    fine = once_more(mesh)
+    fine = in_parts(mesh, n)
     assert_valid_faces(fine)
     twins = naive.twins(mesh.quads)
     n_edges = np.count_nonzero(twins >= 0) // 2 + np.count_nonzero(twins == -1)
-    assert len(fine.points) == len(mesh.points) + n_edges + len(mesh.quads)
-    assert len(fine.quads) == 4 * len(mesh.quads)
-    assert np.allclose(areas(fine.points, fine.quads).reshape(-1, 4).sum(axis=1), areas(mesh.points, mesh.quads))
-    assert np.array_equal(fine.face, np.repeat(mesh.face, 4))
+    assert len(fine.points) == len(mesh.points) + (n - 1) * n_edges + (n - 1) ** 2 * len(mesh.quads)
+    assert len(fine.quads) == n**2 * len(mesh.quads)
+    assert np.allclose(areas(fine.points, fine.quads).reshape(-1, n**2).sum(axis=1), areas(mesh.points, mesh.quads))
+    assert np.array_equal(fine.face, np.repeat(mesh.face, n**2))
     assert irregularity(fine) == irregularity(mesh) > 0
 
 
-def test_quads_begin_at_the_corners_of_the_old_one() -> None:
+@pytest.mark.parametrize("n", [2, 3])
+def test_quads_lie_row_by_row_in_the_old_one(n: int) -> None:
     mesh = grid(3, 2, 0.2)
-    fine = once_more(mesh)
-    assert np.array_equal(fine.quads[:, 0], mesh.quads.ravel())
-    middle = mesh.points[mesh.quads].mean(axis=1)
-    assert np.allclose(fine.points[fine.quads[:, 2]], np.repeat(middle, 4, axis=0))
-    ahead = 0.5 * (mesh.points[mesh.quads] + mesh.points[np.roll(mesh.quads, -1, axis=1)])
-    assert np.allclose(fine.points[fine.quads[:, 1]], ahead.reshape(-1, 2))
+    fine = in_parts(mesh, n)
+    a, b, c, d = np.moveaxis(mesh.points[mesh.quads], 1, 0)
+    for j in range(n):
+        for i in range(n):
+            corner = fine.points[fine.quads[n * j + i :: n**2]]
+            for k, (x, y) in enumerate(((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))):
+                s, t = x / n, y / n
+                expected = (1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * d + s * c)
+                assert np.allclose(corner[:, k], expected)
 
 
-def test_new_rim_points_are_those_named_for_each_half_edge() -> None:
+@pytest.mark.parametrize("n", [2, 3])
+def test_new_rim_points_are_those_named_on_the_way_along_each_half_edge(n: int) -> None:
     mesh = grid(3, 2)
-    fine = once_more(mesh)
+    fine = in_parts(mesh, n)
     twins = naive.twins(mesh.quads)
-    for h in range(twins.size):
-        origin = fine.origin[fine.quads[h, 1]]
-        assert origin == (1000 + h if twins[h] < 0 else -1)
+    named = np.flatnonzero(fine.origin >= 1000)
+    assert len(named) == (n - 1) * np.count_nonzero(twins < 0)
+    for p in named:
+        h, i = divmod(int(fine.origin[p]) - 1000, 10)
+        u, w = mesh.points[mesh.quads[h // 4, h % 4]], mesh.points[mesh.quads[h // 4, (h + 1) % 4]]
+        assert np.allclose(fine.points[p], u + (i + 1) / n * (w - u))
     assert (fine.wanted == np.where(fine.origin < 1000, np.where(fine.origin < 0, 4, fine.wanted), 2)).all()
     assert np.array_equal(valences(fine), fine.wanted)
 
 
-def test_middles_are_looked_up_in_the_graph() -> None:
-    graph = even_graph(4)
-    pairs = coarse_segments(graph, np.ones(graph.n_chains, bool), 2)
-    none = np.zeros(len(pairs.tail), np.int64)
-    table = constraint_table(len(graph.points), pairs.tail, pairs.head, none, none, pairs.middle)
-    coarse = quads_of(graph, 2.0, 4)
+@pytest.mark.parametrize("n", [2, 3])
+def test_points_on_the_way_are_looked_up_in_the_graph(n: int) -> None:
+    """The polygon's sides run in the plane as in the chain: with the points between in the order of the way."""
+    graph = polygon_graph([[0, 0], [24, 0], [24, 24], [0, 24]], [4 * n] * 4, (24, 24))
+    segments = coarse_segments(graph, np.ones(graph.n_chains, bool), n)
+    none = np.zeros(len(segments.tail), np.int64)
+    table = constraint_table(len(graph.points), segments.tail, segments.head, none, none, segments.middle)
+    coarse = quads_of(graph, 2.0 * n, 2 * n)
     twins = twins_of(coarse.quads, len(coarse.points))
-    middle = middles_of(coarse.quads, twins, coarse.origin, table)
-    assert np.array_equal(middle >= 0, twins < 0)
-    assert_valid_faces(split_quads(coarse, twins, middle), graph)
+    between = points_between(coarse.quads, twins, coarse.origin, table, n)
+    assert np.array_equal((between >= 0).all(axis=1), twins < 0)
+    fine = split_quads(coarse, twins, between)
+    rim = fine.origin >= 0
+    assert sorted(fine.origin[rim].tolist()) == list(range(len(graph.points)))
+    assert np.allclose(fine.points[rim], graph.points[fine.origin[rim]])

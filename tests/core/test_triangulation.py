@@ -115,12 +115,13 @@ def test_what_encloses_no_area_or_crosses_is_refused(
 
 def test_constraint_table_tells_the_region_on_the_left_of_each_directed_edge() -> None:
     tail, head = np.array([0, 1, 3]), np.array([1, 2, 1])
-    left, right, middle = np.array([10, 11, 12]), np.array([20, 21, -1]), np.array([7, 8, 9])
+    left, right = np.array([10, 11, 12]), np.array([20, 21, -1])
+    middle = np.array([[7, 70], [8, 80], [9, 90]])
     table = constraint_table(4, tail, head, left, right, middle)
     found = {
         (v, int(table.head[i])): (int(table.region[i]), int(table.middle[i]))
         for v in range(4)
         for i in range(table.offsets[v], table.offsets[v + 1])
     }
-    expected = {(0, 1): (10, 7), (1, 0): (20, 7), (1, 2): (11, 8), (2, 1): (21, 8), (3, 1): (12, 9), (1, 3): (-1, 9)}
+    expected = {(0, 1): (10, 7), (1, 0): (20, 70), (1, 2): (11, 8), (2, 1): (21, 80), (3, 1): (12, 9), (1, 3): (-1, 90)}
     assert found == expected
