@@ -18,10 +18,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from imgquad_core.boundary import extract_boundaries
-from imgquad_core.meshing import EFFORTS, MeshingOptions, mesh_boundaries
+from imgquad_core.meshing import EFFORTS, mesh_boundaries
 from imgquad_core.model import QuadMesh
+from imgquad_core.pipeline import MeshOptions
 from imgquad_core.quality import scaled_jacobian
-from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
+from imgquad_core.smoothing import smooth_boundaries
 from invariants import assert_valid_mesh
 from shapes import KINDS, Labels, label_image, labels_of_kind
 
@@ -56,9 +57,10 @@ def mesh_case(case: Case, effort: str, seconds: dict[str, float]) -> QuadMesh:
     """Mesh one picture and check it; `seconds` adds up."""
     image = label_image(case.labels())
     start = time.perf_counter()
-    graph = smooth_boundaries(extract_boundaries(image), SmoothingOptions(size=case.size))
+    options = MeshOptions(size=case.size, effort=effort)
+    graph = smooth_boundaries(extract_boundaries(image), options.smoothing(image.materials))
     bounded = time.perf_counter()
-    mesh = mesh_boundaries(graph, MeshingOptions(size=case.size, effort=effort), image.materials)
+    mesh = mesh_boundaries(graph, options.meshing(image.materials), image.materials)
     meshed = time.perf_counter()
     assert_valid_mesh(mesh, image)
     checked = time.perf_counter()
