@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from . import aside
 from .batches import LARGEST, batches_of, faces_only, in_threads, joined
@@ -35,7 +37,9 @@ from .outline import (
     outline,
     refined,
     wide_faces,
+    with_chains_of,
     with_short_chains_halved,
+    without_unused_points,
 )
 from .pieces import independent_nodes, strips_of
 from .quality import scaled_jacobian
@@ -58,7 +62,7 @@ GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, a
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
 FAIR = 0.75  # below it, in the end, the worst corner of a ring counts alone; 45 degrees give .71
 WORST = 0.42  # below it the boundary's edges at the quad are halved, in
-WISHES = 3  # rounds at most, of which the best one counts; at folded quads in
+WISHES = 3  # rounds at most, and only what gets better is kept; at folded quads in
 REFITS = 16  # rounds, of which
 PATIENCE = 6  # reach no farther
 CONTRADICTIONS = 6  # rounds in which chains are halved whose coarse outlines contradict each other
@@ -155,8 +159,7 @@ class _State(NamedTuple):
     """All faces meshed, after some rounds."""
 
     graph: BoundaryGraph
-    parts: list[FaceQuads]
-    worst: float  # scaled Jacobian
+    meshed: _Meshed
 
 
 def mesh_boundaries(
@@ -187,34 +190,61 @@ def mesh_boundaries(
     aside.start()
     options = options or MeshingOptions()
     graph = with_short_chains_halved(_consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTH)
-    best = _State(graph, [], -1.0)
-    parts: list[FaceQuads] = []
-    todo, worst = np.ones(len(graph.region_label), bool), np.ones(len(graph.region_label))
-    for attempt in range(REFITS + 1):
-        done = _mesh_faces(graph, todo, options)
-        parts, worst = parts + done.parts, np.where(todo, done.worst, worst)
-        best = max(best, _State(graph, parts, worst.min(initial=1.0)), key=lambda state: state.worst)
-        poor = _poor_rim(done, WORST if attempt < WISHES else 0.0)
-        if len(poor) == 0 or (attempt >= WISHES and best.worst > 0.0):
-            mesh = _stitch(best.graph, best.parts, materials or _materials_of(graph.region_label))
-            return _slid(mesh, EFFORTS[options.effort].slides, options.threads)
-        finer = _refined(graph, poor, attempt)
-        finer = _consistent(finer, _differ(graph, finer))
-        todo = _faces_beside(graph, _differ(graph, finer))
-        parts = _faces_of(parts, ~todo)
-        graph = finer
-    raise TopologyError(f"{len(poor)} boundary points fold quads, the first at {graph.points[poor[0]].tolist()}")
+    everything = np.ones(len(graph.region_label), bool)
+    state = _State(graph, _mesh_faces(graph, everything, options))
+    for attempt in range(REFITS):
+        wished = attempt < WISHES
+        poor = _poor_rim(state.meshed, WORST if wished else 0.0)
+        if len(poor) == 0:
+            break
+        state = _refitted(state, _refined(state.graph, poor, attempt), options)
+    if (poor := _poor_rim(state.meshed, 0.0)).size:
+        where = state.graph.points[poor[0]].tolist()
+        raise TopologyError(f"{len(poor)} boundary points fold quads, the first at {where}")
+    mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
+    return _slid(mesh, EFFORTS[options.effort].slides, options.threads)
+
+
+def _refitted(state: _State, finer: BoundaryGraph, options: MeshingOptions) -> _State:
+    """Mesh the faces beside chains that are finer, and keep what is better, group by group of such neighbours.
+
+    Where quads fold, the new state is kept in any case.
+    """
+    graph, meshed = state
+    finer = _consistent(finer, _differ(graph, finer))
+    changed = _differ(graph, finer)
+    todo = _faces_beside(graph, changed)
+    done = _mesh_faces(finer, todo, options)
+    group = _groups_across(graph, changed)
+    old, new = np.ones((2, len(todo)))
+    np.minimum.at(old, group, meshed.worst)
+    np.minimum.at(new, group, np.where(todo, done.worst, 1.0))
+    better = todo & ((new > old) | (old <= 0.0))[group]
+    parts = _faces_of(meshed.parts, ~better) + _faces_of(done.parts, better)
+    kept = changed & np.append(better, False)[graph.chain_regions].any(axis=1)
+    return _State(
+        with_chains_of(graph, finer, kept),
+        _Meshed(parts, meshed.faces, np.where(better, done.worst, meshed.worst)),
+    )
+
+
+def _groups_across(graph: BoundaryGraph, chains: Flags) -> Ids:
+    """Return the number of the group of each face; faces on both sides of a flagged chain are of one group."""
+    n = len(graph.region_label)
+    pairs = graph.chain_regions[chains]
+    a, b = pairs[(pairs >= 0).all(axis=1)].T
+    return np.asarray(connected_components(coo_array((np.ones(len(a)), (a, b)), (n, n)), False)[1], np.int64)
 
 
 def _refined(graph: BoundaryGraph, poor: Ids, attempt: int) -> BoundaryGraph:
     """Return the graph with halved edges beside points with poor quads.
 
-    A halved edge is straight, so no point there can fold a quad. After some attempts the reach grows, and in the end
-    all edges are halved: that settles it whatever the picture.
+    A halved edge is straight, so no point there can fold a quad. With every wish, and later after some attempts, the
+    reach grows, and in the end all edges are halved: that settles it whatever the picture.
     """
     if attempt == REFITS - 1:
         return halved(graph, np.ones(graph.n_chains, bool))
-    return refined(graph, poor, 2 ** max(attempt - PATIENCE, 0) - 1)
+    return refined(graph, poor, attempt if attempt < WISHES else 2 ** max(attempt - PATIENCE, 0) - 1)
 
 
 def _faces_of(parts: list[FaceQuads], faces: Flags) -> list[FaceQuads]:
@@ -357,9 +387,10 @@ def _faces_beside(graph: BoundaryGraph, chains: Flags) -> Flags:
 
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
     """Join faces at the boundary's points."""
+    graph, place = without_unused_points(graph)
     quads = joined(parts)
     inner = quads.origin < 0
-    ids = quads.origin.copy()
+    ids = place[quads.origin]
     ids[inner] = len(graph.points) + np.arange(inner.sum())
     points = np.vstack([graph.points, quads.points[inner]])
     kind = np.concatenate([graph.point_kind, np.full(inner.sum(), PointKind.INTERIOR, np.uint8)])

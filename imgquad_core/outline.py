@@ -10,6 +10,7 @@ once more at the end, in two or three each way, that gives the others:
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -182,6 +183,25 @@ def refined(graph: BoundaryGraph, points: Ids, reach: int) -> BoundaryGraph:
     np.add.at(split, np.maximum(first, begin), 1)
     np.add.at(split, np.minimum(at - into + stride * (reach + 1), end), -1)
     return _split(graph, np.cumsum(split)[:-1] > 0)
+
+
+def with_chains_of(graph: BoundaryGraph, finer: BoundaryGraph, chains: Flags) -> BoundaryGraph:
+    """Return `finer` with the chains of `graph` but for the flagged ones; points of the others stay, unused."""
+    start = np.where(chains, len(graph.chain_points) + finer.chain_offsets[:-1], graph.chain_offsets[:-1])
+    counts = np.where(chains, np.diff(finer.chain_offsets), np.diff(graph.chain_offsets))
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    place = np.repeat(start - offsets[:-1], counts) + np.arange(offsets[-1])
+    points = np.concatenate([graph.chain_points, finer.chain_points])[place]
+    return replace(finer, chain_offsets=offsets, chain_points=points)
+
+
+def without_unused_points(graph: BoundaryGraph) -> tuple[BoundaryGraph, Ids]:
+    """Return the graph without points that no chain has, and the new id of each point."""
+    used = np.zeros(len(graph.points), bool)
+    used[graph.chain_points] = True
+    place = np.cumsum(used) - 1
+    points, kind = graph.points[used], graph.point_kind[used]
+    return replace(graph, points=points, point_kind=kind, chain_points=place[graph.chain_points]), place
 
 
 def _chain_of_places(graph: BoundaryGraph) -> Ids:

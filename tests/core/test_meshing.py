@@ -17,7 +17,6 @@ from imgquad_core.meshing import EFFORTS, MeshingOptions, mesh_boundaries
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind, QuadMesh
 from imgquad_core.quality import quality_report
 from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
-from imgquad_core.splitting import FaceQuads
 from invariants import assert_valid_mesh
 from shapes import Labels, disc, label_image, voronoi
 
@@ -120,25 +119,32 @@ def test_edges_are_halved_beside_points_that_fold_quads(refits: int, monkeypatch
         assert (finer == 2 * edges).all()
 
 
-@pytest.mark.parametrize("best", [0, 1, 2])
-def test_of_the_rounds_that_halve_edges_the_best_one_counts(best: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    image = label_image(voronoi(60, 50, 9, 1))
+def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    y, x = np.mgrid[:60, :70]
+    image = label_image(((x + 4 * np.sin(y / 5)) // 10).astype(np.int32))  # wavy stripes
     graph = boundaries(image, 4.0)
-    edges: list[int] = []
-    state = meshing._State
+    mesh_faces = meshing._mesh_faces
+    first, last = int(graph.region_label.argmin()), int(graph.region_label.argmax())
+    rounds: list[set[int]] = []
 
-    def pretended(graph: BoundaryGraph, parts: list[FaceQuads], worst: float) -> meshing._State:
-        if parts:
-            edges.append(len(np.unique(np.concatenate([part.origin for part in parts]))) - 1)
-        return state(graph, parts, 0.9 if len(edges) == best + 1 else 0.3)
+    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions) -> meshing._Meshed:
+        done = mesh_faces(graph, todo, options)
+        worst = np.full(len(todo), 0.95)
+        worst[first], worst[last] = (0.95, 0.2) if rounds else (0.3, 0.3)
+        rounds.append(set(np.flatnonzero(todo).tolist()))
+        return done._replace(worst=worst)
 
-    monkeypatch.setattr(meshing, "WORST", 0.9)  # so that there are rounds
-    monkeypatch.setattr(meshing, "_State", pretended)
+    monkeypatch.setattr(meshing, "WORST", 0.9)
+    monkeypatch.setattr(meshing, "_mesh_faces", pretended)
     mesh = mesh_boundaries(graph, MeshingOptions(size=4.0, effort="fast"), image.materials)
     assert_valid_mesh(mesh, image)
-    assert len(edges) == meshing.WISHES + 1
-    assert len(np.unique(mesh.chain_points)) == edges[best]
-    assert len(set(edges)) == len(edges)
+    assert len(rounds) == meshing.WISHES + 1
+    assert {first, last} <= rounds[1]
+    assert all(last in todo and first not in todo for todo in rounds[2:])
+    edges, finer = np.diff(graph.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
+    beside = (graph.chain_regions == first).any(axis=1)
+    assert (finer > edges)[beside].any()
+    assert np.array_equal(finer[~beside], edges[~beside])
 
 
 def test_very_wide_faces_are_split_in_nine_with_the_most_effort(monkeypatch: pytest.MonkeyPatch) -> None:

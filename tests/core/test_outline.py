@@ -10,7 +10,16 @@ import pytest
 
 from faces import graph_of, polygon_graph, voronoi_graph
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
-from imgquad_core.outline import chains_of, coarse_segments, halved, outline, refined, wide_faces
+from imgquad_core.outline import (
+    chains_of,
+    coarse_segments,
+    halved,
+    outline,
+    refined,
+    wide_faces,
+    with_chains_of,
+    without_unused_points,
+)
 
 SQUARE = [[0, 0], [32, 0], [32, 32], [0, 32]]
 
@@ -191,3 +200,17 @@ def with_new(ids: list[int], split: list[int], first_new: int) -> list[int]:
     for k, v in enumerate(ids):
         out += [v, first_new + split.index(k)] if k in split else [v]
     return out
+
+
+def test_chains_of_a_finer_graph_replace_some_and_points_that_none_has_go() -> None:
+    graph = voronoi_graph(64, 3, 4.0, 1)
+    finer = halved(graph, everything(graph))
+    some = np.arange(graph.n_chains) % 3 == 0
+    mixed = with_chains_of(graph, finer, some)
+    for c in range(graph.n_chains):
+        assert mixed.chain(c).tolist() == (finer if some[c] else graph).chain(c).tolist()
+    lean, place = without_unused_points(mixed)
+    assert len(lean.points) == len(np.unique(lean.chain_points)) < len(mixed.points)
+    assert np.array_equal(lean.points[lean.chain_points], mixed.points[mixed.chain_points])
+    assert np.array_equal(place[mixed.chain_points], lean.chain_points)
+    assert without_unused_points(finer)[0].points.tobytes() == finer.points.tobytes()
