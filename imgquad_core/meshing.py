@@ -139,11 +139,11 @@ class MeshingOptions:
         return sizes
 
 
-class _Conflict(Exception):
+class _Conflict(TopologyError):
     """Outlines of these regions contradict each other at this stride."""
 
     def __init__(self, regions: Ids) -> None:
-        super().__init__(f"regions {regions[:10].tolist()}")
+        super().__init__(f"the outlines of regions {regions[:10].tolist()} contradict each other")
         self.regions = regions
 
 
@@ -197,7 +197,12 @@ def mesh_boundaries(
         poor = _poor_rim(state.meshed, WORST if wished else 0.0)
         if len(poor) == 0:
             break
-        state = _refitted(state, _refined(state.graph, poor, attempt), options)
+        try:
+            state = _refitted(state, _refined(state.graph, poor, attempt), options)
+        except TopologyError:
+            if state.meshed.worst.min(initial=1.0) <= 0.0:
+                raise
+            break  # what is there is valid
     if (poor := _poor_rim(state.meshed, 0.0)).size:
         where = state.graph.points[poor[0]].tolist()
         raise TopologyError(f"{len(poor)} boundary points fold quads, the first at {where}")
@@ -289,7 +294,7 @@ def _consistent(graph: BoundaryGraph, new: Flags) -> BoundaryGraph:
 def _mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> _Meshed:
     """Mesh flagged faces on their levels."""
     effort = EFFORTS[options.effort]
-    best = _Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -1.0))
+    best = _Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -np.inf))
     if effort.in_nine:
         even = mean_edges(graph) > EVEN * options.face_sizes(graph.region_label)
         best = _better(best, _mesh_wide(graph, todo & wide_faces(graph, 6, VERY_WIDE) & even, 6, effort.wide, options))
@@ -308,10 +313,8 @@ def _better(one: _Meshed, other: _Meshed) -> _Meshed:
 
 def _large_faces(meshed: _Meshed) -> Flags:
     """Return which faces have so many quads that they are not meshed again for one that is not that bad."""
-    count = np.zeros(len(meshed.faces), np.int64)
-    for part in meshed.parts:
-        count += np.bincount(part.face, minlength=len(count))
-    return np.asarray(count > LARGE)
+    faces = [np.empty(0, np.int64), *(part.face for part in meshed.parts)]
+    return np.asarray(np.bincount(np.concatenate(faces), minlength=len(meshed.faces)) > LARGE)
 
 
 def _mesh_wide(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> _Meshed:

@@ -148,6 +148,35 @@ def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypa
     assert np.array_equal(finer[far], edges[far])
 
 
+def test_a_wish_that_fails_leaves_the_valid_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    image = label_image(voronoi(60, 50, 9, 1))
+    graph = boundaries(image, 4.0)
+    options = MeshingOptions(size=4.0, effort="fast")
+    as_it_was = mesh_boundaries(graph, options)
+
+    def failing(*_: object) -> None:
+        raise TopologyError("no finer boundary")
+
+    monkeypatch.setattr(meshing, "WORST", 0.9)
+    monkeypatch.setattr(meshing, "_refitted", failing)
+    mesh = mesh_boundaries(graph, options, image.materials)
+    assert mesh.points.tobytes() == as_it_was.points.tobytes()
+    assert_valid_mesh(mesh, image)
+
+
+def test_every_face_has_quads_however_bad_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    def worst_there_is(points: Points, quads: Any, face: Any, worst: Points) -> None:
+        worst[face] = -1.0
+
+    graph = voronoi_graph(64, 3, 2.0, 0)
+    everything = np.ones(len(graph.region_label), bool)
+    monkeypatch.setattr(meshing, "lower_to_worst", worst_there_is)
+    for effort in EFFORTS:
+        done = meshing._mesh_faces(graph, everything, MeshingOptions(size=2.0, effort=effort))
+        faces = np.concatenate([np.unique(part.face) for part in done.parts])
+        assert sorted(faces.tolist()) == list(range(len(everything)))
+
+
 def test_very_wide_faces_are_split_in_nine_with_the_most_effort(monkeypatch: pytest.MonkeyPatch) -> None:
     image = label_image(disc(50, (110, 110), 220))
     graph = boundaries(image, 2.0, in_twelves=True)
