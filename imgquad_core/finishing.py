@@ -42,7 +42,7 @@ POOR = 0.7  # scaled Jacobian below which single quads are replaced
 
 
 def finished(
-    batches: list[FaceQuads], targets: Points, pieces: int, rim: Constraints, how: CleanUp, threads: int
+    batches: list[FaceQuads], targets: Points, across: int, rim: Constraints, how: CleanUp, threads: int
 ) -> list[FaceQuads]:
     """Turn composed quads into the final ones of their faces, batch by batch.
 
@@ -52,8 +52,8 @@ def finished(
         Composed quads, from `batches_of`.
     targets : float64, shape (n, 2)
         Where the rim belongs: points of the boundary, by `FaceQuads.origin`.
-    pieces : int
-        Number of quads, 1, 2 or 3, that each one is split into in both directions after its clean-up.
+    across : int
+        Number of quads, 1, 2 or 3, across each one when it is split after the clean-up.
     rim : Constraints
         The rim's edges before that split, with the boundary's points between their ends.
     how : CleanUp
@@ -64,26 +64,26 @@ def finished(
 
     def whole(part: FaceQuads) -> FaceQuads:
         part = clean_up(_relaxed(_fitted(part, targets, False), *DRAFT), how)
-        if pieces > 1:  # smoothed while there are few nodes
-            part = _split(_relaxed(part, *FULL), rim, pieces)
+        if across > 1:  # smoothed while there are few nodes
+            part = _split(_relaxed(part, *FULL), rim, across)
         return _without_poor(_relaxed(_fitted(part, targets, True), *last))
 
     def large(part: FaceQuads) -> FaceQuads:
         part = _cleaned_in_pieces(_fitted(part, targets, False), how, threads)
-        if pieces > 1:
-            part = _split(_relaxed_in_pieces(part, *FULL, threads), rim, pieces)
+        if across > 1:
+            part = _split(_relaxed_in_pieces(part, *FULL, threads), rim, across)
         return _relaxed_in_pieces(_fitted(part, targets, True), *last, threads)
 
-    last = FULL if pieces == 1 else AGAIN
+    last = FULL if across == 1 else AGAIN
     small = in_threads([part for part in batches if not is_large(part)], whole, threads)
     single = [large(part) for part in batches if is_large(part)]
     return [*small, *in_threads(single, _without_poor, threads)]
 
 
-def _split(part: FaceQuads, rim: Constraints, pieces: int) -> FaceQuads:
+def _split(part: FaceQuads, rim: Constraints, across: int) -> FaceQuads:
     """Split every quad into four or nine."""
     twins = twins_of(part.quads, len(part.points))
-    return split_quads(part, twins, points_between(part.quads, twins, part.origin, rim, pieces))
+    return split_quads(part, twins, points_between(part.quads, twins, part.origin, rim, across))
 
 
 def _cleaned_in_pieces(face: FaceQuads, how: CleanUp, threads: int) -> FaceQuads:
