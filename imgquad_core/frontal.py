@@ -276,6 +276,7 @@ def _advance(mesh: CutMesh, field: CrossField, spokes: Spokes, front: _Front) ->
         for k in range(n):
             size, turn = front.size[p], first + k * step
             ex, ey = x + size * np.cos(turn), y + size * np.sin(turn)
+            # most spokes end where a point is already: told without a walk
             if _crowded(front, mesh.face, mesh.face[t], ex, ey, size, (EXCLUSION - PULL) * size):
                 continue
             e, ex, ey, size, arm = _spoke_end(mesh, field, t, x, y, size, turn)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,9 @@ import naive
 from faces import (
     areas,
     assert_valid_faces,
+    graph_of,
     grid,
     irregularity,
-    polygon_graph,
     quads_of,
     valences,
     voronoi_graph,
@@ -20,7 +22,7 @@ from faces import (
 from imgquad_core.composing import compose
 from imgquad_core.halfedge import twins_of
 from imgquad_core.model import BoundaryGraph
-from imgquad_core.outline import coarse_segments, halved
+from imgquad_core.outline import coarse_segments
 from imgquad_core.splitting import FaceQuads, points_between, split_composed, split_quads
 from imgquad_core.triangulation import constraint_table
 
@@ -64,10 +66,18 @@ def test_triangles_alone_give_one_node_of_valence_three_each() -> None:
     assert naive.worst_quality(mesh.points, mesh.quads) > 0
 
 
-def even_graph(seed: int) -> BoundaryGraph:
-    """Four grains whose chains have multiples of four edges."""
+def finer_graph(seed: int, n: int = 2) -> BoundaryGraph:
+    """Four grains, n edges for each of an even number on every chain."""
     graph = voronoi_graph(64, 2, 4.0, seed)
-    return halved(graph, np.ones(graph.n_chains, bool))
+    points, chains = [*graph.points], []
+    for c in range(graph.n_chains):
+        ids = graph.chain(c).tolist()
+        chain = ids[:1]
+        for u, w in pairwise(ids):
+            chain += [*range(len(points), len(points) + n - 1), w]
+            points += [graph.points[u] + k / n * (graph.points[w] - graph.points[u]) for k in range(1, n)]
+        chains.append(chain)
+    return graph_of(np.array(points), chains, [*map(tuple, graph.chain_regions.tolist())], graph.shape)
 
 
 def in_parts(mesh: FaceQuads, n: int) -> FaceQuads:
@@ -79,7 +89,7 @@ def in_parts(mesh: FaceQuads, n: int) -> FaceQuads:
 
 @pytest.mark.parametrize("n", [2, 3])
 def test_split_of_quads_adds_no_irregular_node(n: int) -> None:
-    mesh = quads_of(even_graph(2), 2.0, 4)
+    mesh = quads_of(finer_graph(2), 2.0, 4)
     fine = in_parts(mesh, n)
     assert_valid_faces(fine)
     twins = naive.twins(mesh.quads)
@@ -122,16 +132,12 @@ def test_new_rim_points_are_those_named_on_the_way_along_each_half_edge(n: int) 
 
 @pytest.mark.parametrize("n", [2, 3])
 def test_points_on_the_way_are_looked_up_in_the_graph(n: int) -> None:
-    """The polygon's sides run in the plane as in the chain: with the points between in the order of the way."""
-    graph = polygon_graph([[0, 0], [24, 0], [24, 24], [0, 24]], [4 * n] * 4, (24, 24))
+    graph = finer_graph(4, n)
     segments = coarse_segments(graph, np.ones(graph.n_chains, bool), n)
     none = np.zeros(len(segments.tail), np.int64)
     table = constraint_table(len(graph.points), segments.tail, segments.head, none, none, segments.middle)
-    coarse = quads_of(graph, 2.0 * n, 2 * n)
+    coarse = quads_of(graph, 2.0, 2 * n)
     twins = twins_of(coarse.quads, len(coarse.points))
     between = points_between(coarse.quads, twins, coarse.origin, table, n)
-    assert np.array_equal((between >= 0).all(axis=1), twins < 0)
-    fine = split_quads(coarse, twins, between)
-    rim = fine.origin >= 0
-    assert sorted(fine.origin[rim].tolist()) == list(range(len(graph.points)))
-    assert np.allclose(fine.points[rim], graph.points[fine.origin[rim]])
+    assert np.array_equal(between >= 0, np.repeat(twins[:, None] < 0, n - 1, axis=1))
+    assert_valid_faces(split_quads(coarse, twins, between), graph)
