@@ -18,6 +18,7 @@ from imgquad_core.curves import Floats, Ints, Places, places_of
 
 _STEPS = 5
 _SMALL = 50  # px; smaller regions take what cannot be given to all
+_SHARPEST = 0.2  # 1 + cos of the largest turn that is mitred, 143 degrees
 _GOOD = 1e-4  # share of a region's area that may stay missing
 
 
@@ -56,7 +57,7 @@ def restore_areas(
     target : int64 or float64, shape (n_regions,)
         Wanted areas.
     bound : float64, shape (len(chain_points),)
-        How far each point of a chain may be shifted; 0 at least at the ends of open chains.
+        How far the segments at each point of a chain may be shifted; 0 at least at the ends of open chains.
     shift : float64, shape (n_chains,)
         Shifts to start from.
 
@@ -69,7 +70,7 @@ def restore_areas(
     """
     places, most = places_of(chain_points, offsets), bound.max()
     bound = bound[places.at]
-    normal = _normals(points, places)
+    normal = mitres(points, places)
     moved = _moved(points, places, bound, normal, shift)
     for _ in range(_STEPS):
         missing = target - _areas(_swept(moved, places, len(shift)), sides, len(target))
@@ -81,9 +82,18 @@ def restore_areas(
     return moved, shift
 
 
-def _normals(points: Floats, places: Places) -> Floats:
-    """Left normal at each place."""
-    along = points[places.after] - points[places.before]
+def mitres(points: Floats, places: Places) -> Floats:
+    """Shift of each place that shifts the segments before and after it by 1 to their left.
+
+    At a corner with an angle of 2 a that is a shift by 1 / sin(a): both its sides keep their directions.
+    """
+    unit = _left_normals(points[places.here] - points[places.before])
+    unit_after = _left_normals(points[places.after] - points[places.here])
+    share = 1.0 + (unit * unit_after).sum(axis=1)
+    return np.asarray((unit + unit_after) / np.maximum(share, _SHARPEST)[:, None])
+
+
+def _left_normals(along: Floats) -> Floats:
     length = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-12)
     return np.stack([-along[:, 1] / length, along[:, 0] / length], axis=1)
 

@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.areas import restore_areas
+from imgquad_core.areas import mitres, restore_areas
 from imgquad_core.clearance import SHARP, snapped
-from imgquad_core.curves import Curves, Ends, Flags, Floats, Ints, per_point, pin_ends
+from imgquad_core.curves import Curves, Ends, Flags, Floats, Ints, per_point, pin_ends, places_of
 from imgquad_core.errors import TopologyError
 from imgquad_core.model import BoundaryGraph
 from imgquad_core.placement import even_out, place_nodes, points_at
 from imgquad_core.polylines import Level, Nodes, any_of_chain, level_of, mark_conflicts, number_nodes
-from imgquad_core.spacing import grade_chains
+from imgquad_core.spacing import grade_along, grade_chains
 
 _GENTLE_ROUNDS = 8  # that mind sectors and room; later ones only crossings
 _ROUNDS = 14  # until chains with crossings get their pixels back, and
@@ -29,7 +29,7 @@ _CLOSER, _LESS_CLOSE = 0.6, 0.8  # factors on the wanted length, at crossings an
 _CLOSEST = 0.25  # px between nodes, and no less
 _AREA_ROOM = 0.7  # of the bound of smoothing, for the shift that restores areas
 _AREA_ROUNDS = 10
-_KINK = 0.3  # shift for areas over the distance to the next node that stays
+_KINK = 0.3  # by how much the shift for areas may change along a chain, over the length
 
 
 class Draft(NamedTuple):
@@ -187,25 +187,15 @@ def _widened(flags: Flags) -> Flags:
 
 
 def _area_bounds(curves: Curves, nodes: Nodes, room: Floats, max_shift: float) -> Floats:
-    """How far each node may be shifted for areas: little beside nodes that stay, so that no kink arises."""
+    """How far the segments at each node may be shifted: little beside nodes that stay, so that no kink arises."""
     offsets, at = nodes.placed.offsets, nodes.placed.at
     gone = np.hypot(*(nodes.points[nodes.chain_points] - points_at(curves.raw, at)).T)
     bound = np.minimum(max_shift - gone, _AREA_ROOM * room[at.astype(np.int64)])
-    stays = nodes.placed.is_corner | np.repeat(curves.is_frame, np.diff(offsets))
+    places = places_of(nodes.chain_points, offsets)
+    bound[places.at] /= np.maximum(np.hypot(*mitres(nodes.points, places).T), 1.0)
+    stays = np.repeat(curves.is_frame, np.diff(offsets))
     is_open = curves.ends[:, 0] >= 0
     stays[offsets[:-1][is_open]] = stays[offsets[1:][is_open] - 1] = True
-    arc = curves.arc[at.astype(np.int64)] + (at % 1.0)
-    bound = np.minimum(bound, _KINK * _arc_to_next(arc, stays, offsets))
     bound[stays] = 0.0
-    return np.maximum(bound, 0.0)
-
-
-def _arc_to_next(arc: Floats, flags: Flags, offsets: Ints) -> Floats:
-    """Length along each chain to the nearest flagged place, infinite where there is none."""
-    place, last = np.arange(len(arc)), len(arc)
-    begin, end = np.repeat(offsets[:-1], np.diff(offsets)), np.repeat(offsets[1:], np.diff(offsets))
-    before = np.maximum.accumulate(np.where(flags, place, -1))
-    after = np.minimum.accumulate(np.where(flags, place, last)[::-1])[::-1]
-    back = np.where(before >= begin, arc - arc[before], np.inf)
-    ahead = np.where(after < end, arc[np.minimum(after, last - 1)] - arc, np.inf)
-    return np.minimum(back, ahead)
+    arc = np.interp(at, np.arange(len(curves.arc)), curves.arc)
+    return grade_along(np.maximum(bound, 0.0), arc, offsets, curves.ends, _KINK)

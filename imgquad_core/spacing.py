@@ -79,11 +79,11 @@ def grade_chains(size: Floats, curves: Curves, n_nodes: int, edge_ratio: float) 
     node = curves.ends[is_open].ravel()
     place = np.stack([curves.offsets[:-1], curves.offsets[1:] - 1], axis=1)[is_open].ravel()
     for _ in range(_PAST_ENDS):
-        size = _grade_chains(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
+        size = grade_along(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
         least = np.full(n_nodes, np.inf)
         np.minimum.at(least, node, size[place])
         size[place] = least[node]
-    return _grade_chains(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
+    return grade_along(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
 
 
 @kernel
@@ -139,16 +139,17 @@ def _chamfer(raster: NDArray[np.float32], straight: np.float32, slanting: np.flo
 
 
 @kernel
-def _grade_chains(size: Floats, arc: Floats, offsets: Ints, ends: Ints, slope: float) -> Floats:
-    size = size.copy()
+def grade_along(values: Floats, arc: Floats, offsets: Ints, ends: Ints, slope: float) -> Floats:
+    """Limit values so that they grow by no more than `slope` times the arc along each chain."""
+    values = values.copy()
     for c in range(len(offsets) - 1):
         first, last = offsets[c], offsets[c + 1] - 1
         for _ in range(1 if ends[c, 0] >= 0 else 2):  # a closed chain needs the second round
             if ends[c, 0] < 0:
-                size[first] = min(size[first], size[last])
-                size[last] = size[first]
+                values[first] = min(values[first], values[last])
+                values[last] = values[first]
             for i in range(first + 1, last + 1):
-                size[i] = min(size[i], size[i - 1] + slope * (arc[i] - arc[i - 1]))
+                values[i] = min(values[i], values[i - 1] + slope * (arc[i] - arc[i - 1]))
             for i in range(last - 1, first - 1, -1):
-                size[i] = min(size[i], size[i + 1] + slope * (arc[i + 1] - arc[i]))
-    return size
+                values[i] = min(values[i], values[i + 1] + slope * (arc[i + 1] - arc[i]))
+    return values
