@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from imgquad_core.curves import Curves, Flags, Floats, line_beside, started_at
+from imgquad_core.curves import Curves, Flags, Floats, Ints, line_beside, started_at
 from imgquad_core.fitting import quadratic_at
 from imgquad_core.jit import kernel, verb
 
 _SIDE = 6.0  # px of arc of each side
-_SIDES = np.array([26.0, 18.0, 12.0, 8.5, _SIDE])  # what is tried to place a corner, as long as both are straight
+_SIDES = np.array([26.0, 18.0, 12.0, 8.5, _SIDE])  # what is tried to measure a corner: the longest that are straight
 _NEAR = 0.4  # px beside the corner that are left out
 _STRAIGHT = 0.32  # px, largest residual (rms) of a side
 _TURN, _TIP = 0.8, 2.5  # radians, least and largest turn between the sides; beyond it is the round tip of a line
 _UNLIKE = 0.20  # px, least residual of one quadratic through both sides
-_FARTHEST = 1.5  # px from the pixel boundary
+_FARTHEST = 2.0  # px from the pixel boundary
 _APART = 4.2  # px of arc between corners
 _AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
 
@@ -38,7 +38,7 @@ def find_corners(curves: Curves) -> tuple[Curves, Flags]:
     is_corner : bool, shape (n,)
         Dense points that are corners; where a closed chain starts at one, its last point too.
     """
-    return started_at(curves, _find(curves))
+    return started_at(curves, _find(curves, _SIDES))
 
 
 def place_corners(curves: Curves, is_corner: Flags, room: Floats, points: Floats) -> None:
@@ -51,16 +51,46 @@ def _place(curves: Curves, is_corner: Flags, room: Floats, lengths: Floats, poin
     for c in range(len(curves.ends)):
         for i in range(curves.offsets[c], curves.offsets[c + 1]):
             if is_corner[i]:
-                for far in lengths:
-                    straight, dx, dy = _corner_at(curves, c, i, far)
-                    if straight > 0.0:
-                        break
+                _, dx, dy = _corner_at(curves, c, i, lengths)
                 scale = min(1.0, room[i] / max(np.hypot(dx, dy), 1e-9))
                 points[i, 0], points[i, 1] = curves.raw[i, 0] + scale * dx, curves.raw[i, 1] + scale * dy
 
 
 @kernel
-def _find(curves: Curves) -> Flags:
+def beside_corners(curves: Curves, is_corner: Flags) -> Ints:
+    """Return for each dense point the corner that it is within a side's length of; -1 for none."""
+    corner = np.full(len(curves.raw), -1, np.int64)
+    for c in range(len(curves.ends)):
+        for i in range(curves.offsets[c], curves.offsets[c + 1]):
+            if is_corner[i]:
+                corner[i] = i
+                for step in (-1, 1):
+                    _mark_side(curves, c, i, step, is_corner, corner)
+    return corner
+
+
+@verb
+def _mark_side(curves: Curves, c: int, i: int, step: int, is_corner: Flags, corner: Ints) -> None:
+    """Mark the points on one side of corner i, up to the next corner or the end of the chain."""
+    begin, end = curves.offsets[c], curves.offsets[c + 1] - 1
+    if step < 0:
+        begin, end = end, begin
+    k, gone = i, 0.0
+    while gone <= _SIDE:
+        if k == end:
+            if curves.ends[c, 0] >= 0:
+                break
+            k = begin  # the same place of a closed chain
+            corner[k] = i
+        k += step
+        gone += abs(curves.arc[k] - curves.arc[k - step])
+        if is_corner[k]:
+            break
+        corner[k] = i
+
+
+@kernel
+def _find(curves: Curves, lengths: Floats) -> Flags:
     score = np.zeros(len(curves.raw))
     is_corner = np.zeros(len(curves.raw), np.bool_)
     x, y, s, q, sums = np.empty(99), np.empty(99), np.empty(99), np.full(99, 1.0), np.empty(14)
@@ -69,7 +99,7 @@ def _find(curves: Curves) -> Flags:
             continue
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
         for i in range(first + (curves.ends[c, 0] >= 0), last):
-            straight, dx, dy = _corner_at(curves, c, i, _SIDE)
+            straight, dx, dy = _corner_at(curves, c, i, lengths)
             if straight <= 0.0:
                 continue
             middle = _gather(curves, c, i, x, y, s)
@@ -79,24 +109,39 @@ def _find(curves: Curves) -> Flags:
                 score[j] = max(score[j], gain + straight)
         for i in range(first, last):
             if score[i] > 0.0 and _is_best(curves, c, i, score):
-                is_corner[i] = _corner_at(curves, c, i, _SIDE)[0] > 0.0
+                is_corner[i] = _corner_at(curves, c, i, lengths)[0] > 0.0
     return is_corner
 
 
 @verb
-def _corner_at(curves: Curves, c: int, i: int, far: float) -> tuple[float, float, float]:
-    """How straight the sides of point i are (0: no corner), and the shift to where their lines meet."""
+def _corner_at(curves: Curves, c: int, i: int, lengths: Floats) -> tuple[float, float, float]:
+    """How straight the sides of point i are (0: no corner), and the shift to where their lines meet.
+
+    The longest sides that are straight tell: lines through 6 px of pixel stairs are off by up to 6 degrees.
+    """
     step = curves.ends.shape[1] - 1  # 1, but not a literal: those are compiled for on their own
-    n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, far)
-    m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, far)
-    turn = np.pi - abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
-    if n < 6 or m < 6 or max(rms_u, rms_v) > _STRAIGHT or not _TURN <= turn <= _TIP:
+    n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, _SIDE)
+    m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, _SIDE)
+    if n < 6 or m < 6 or max(rms_u, rms_v) > _STRAIGHT or _turn(ux, uy, vx, vy) < _TURN:
+        return 0.0, 0.0, 0.0
+    for far in lengths:
+        n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, far)
+        m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, far)
+        if max(rms_u, rms_v) <= _STRAIGHT:
+            break
+    if not _TURN <= _turn(ux, uy, vx, vy) <= _TIP:
         return 0.0, 0.0, 0.0
     t = ((bx - ax) * vy - (by - ay) * vx) / (ux * vy - uy * vx)
     x, y = ax + t * ux, ay + t * uy
     if not (x * x + y * y < _FARTHEST**2 and x * ux + y * uy < _AHEAD and x * vx + y * vy < _AHEAD):
         return 0.0, 0.0, 0.0
     return 1.0 - max(rms_u, rms_v), x, y
+
+
+@verb
+def _turn(ux: float, uy: float, vx: float, vy: float) -> float:
+    """Turn from one side to the other, of directions that both lead away from the corner."""
+    return float(np.pi - abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy)))
 
 
 @verb

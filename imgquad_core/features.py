@@ -19,7 +19,7 @@ _REACH = (
 )
 
 
-def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float) -> Floats:
+def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float, corner: Ints | None = None) -> Floats:
     """Distance to the nearest foreign point of the boundary.
 
     Parameters
@@ -32,6 +32,8 @@ def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float
         Largest distance of interest, in pixels.
     bend : float
         Arc over distance from which a point is foreign.
+    corner : int64, shape (n,), optional
+        Corner that each point is beside, -1 for none: both sides of one corner are not foreign to each other.
 
     Returns
     -------
@@ -39,6 +41,7 @@ def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float
         Distance in pixels, infinity where nothing foreign was found within about `reach`.
     """
     chain = np.repeat(np.arange(len(curves.ends)), np.diff(curves.offsets))
+    corner = np.full(len(points), -1) if corner is None else corner
     lfs = np.full(len(points), np.inf)
     stride, level = 1, min(_REACH, reach)
     while True:
@@ -46,7 +49,7 @@ def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float
         cell = max(level / 2, 1.0)
         n_across, n_up = (points.max(axis=0) / cell).astype(np.int64) + 1
         start, items = bucket(points, ids, cell, n_across, n_up)
-        _nearest_foreign(points, curves, chain, ids, start, items, n_across, cell, level, bend, lfs)
+        _nearest_foreign(points, curves, chain, corner, ids, start, items, n_across, cell, level, bend, lfs)
         if stride > 1:
             _spread(ids, stride, chain, lfs)
         if level >= reach:
@@ -100,6 +103,7 @@ def _nearest_foreign(
     points: Floats,
     curves: Curves,
     chain: Ints,
+    corner: Ints,
     ids: Ints,
     start: Ints,
     items: Ints,
@@ -129,7 +133,9 @@ def _nearest_foreign(
                     for at in range(start[r * n_across + k], start[r * n_across + k + 1]):
                         j = items[at]
                         d2 = (points[j, 0] - x) ** 2 + (points[j, 1] - y) ** 2
-                        if d2 < best and _arc_between(curves, chain[i], i, chain[j], j) > bend * np.sqrt(d2):
+                        if d2 >= best or (corner[i] >= 0 and corner[i] == corner[j]):
+                            continue
+                        if _arc_between(curves, chain[i], i, chain[j], j) > bend * np.sqrt(d2):
                             best = d2
                             found = True
         if found:

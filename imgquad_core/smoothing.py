@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imgquad_core.areas import polygon_areas
-from imgquad_core.corners import find_corners, place_corners
+from imgquad_core.corners import beside_corners, find_corners, place_corners
 from imgquad_core.curves import Curves, Flags, Floats, Ints, curves_of, per_point, pin_ends
 from imgquad_core.errors import InputError
 from imgquad_core.features import local_feature_size
@@ -140,7 +140,8 @@ def _asked_sizes(graph: BoundaryGraph, options: SmoothingOptions) -> Floats:
 def _room(curves: Curves, is_corner: Flags, max_shift: float) -> Floats:
     """How far smoothing may move each dense point."""
     reach = max(_NARROW, max_shift / _ROOM)
-    free = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO)
+    corner = beside_corners(curves, is_corner)
+    free = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO, corner)
     return np.asarray(np.minimum(free, np.where(is_corner, 1.0, _SHARE) * max_shift))
 
 

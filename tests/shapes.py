@@ -45,6 +45,14 @@ def square(side: float, degrees: float, centre: tuple[float, float], n: int) -> 
     return ((abs(u) < side / 2) & (abs(v) < side / 2)).astype(np.int32), corners
 
 
+def wedge(degrees: float, turn: float, tip: ArrayLike, radius: float, n: int) -> Labels:
+    """Sector of a disc around `tip`, from direction `turn` to ``turn + degrees``, of material 1."""
+    x, y = pixel_centres(n, n)
+    dx, dy = x - np.asarray(tip)[0], y - np.asarray(tip)[1]
+    direction = (np.degrees(np.arctan2(dy, dx)) - turn) % 360.0
+    return ((direction < degrees) & (np.hypot(dx, dy) < radius)).astype(np.int32)
+
+
 def spiral(n: int) -> Labels:
     """One pixel wide spiral of material 1, its windings one pixel apart."""
     labels = np.zeros((n, n), np.int32)

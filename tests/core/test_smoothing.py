@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from imgquad_core import resolving
+from imgquad_core.areas import restore_areas
 from imgquad_core.boundary import POLICIES, ExtractionOptions, extract_boundaries
 from imgquad_core.curves import curves_of, per_point
 from imgquad_core.errors import InputError
 from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.smoothing import SmoothingOptions, region_areas, smooth_boundaries
 from planar import check_meshable, check_planar
-from shapes import any_labels, disc, half_plane, label_image, spiral, square, voronoi
+from shapes import any_labels, disc, half_plane, label_image, spiral, square, voronoi, wedge
 
 SIZES = (1.0, 2.5, 6.0)
 
@@ -167,6 +168,30 @@ def test_a_square_keeps_its_corners(degrees: float) -> None:
     places = np.flatnonzero(graph.point_kind[chain] == PointKind.CORNER)
     assert len(places) == 5
     assert (places % 4 == 0).all()
+
+
+@pytest.mark.parametrize("degrees", [40, 45, 50, 60])
+@pytest.mark.parametrize("seed", range(8))
+def test_a_wedge_keeps_its_tip_and_its_angle(degrees: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn, tip = rng.uniform(0, 360), 55 + rng.random(2)
+    graph = smoothed(wedge(degrees, turn, tip, 45.0, 110), 3.0)
+    off = np.hypot(*(graph.points - tip).T)
+    v = int(off.argmin())
+    assert graph.point_kind[v] == PointKind.CORNER
+    assert off[v] < 0.8
+    ends = graph.segments[(graph.segments == v).any(axis=1)]
+    a, b = graph.points[ends[ends != v]] - graph.points[v]
+    angle = np.degrees(np.arccos(a @ b / np.hypot(*a) / np.hypot(*b)))
+    assert angle == pytest.approx(degrees, abs=4.0)
+
+
+def test_areas_are_given_back_without_turning_the_sides_of_corners() -> None:
+    corners = np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]])
+    ring, turn = np.array([0, 1, 2, 3, 0]), np.array([0, 5])
+    sides, area = np.array([[0, -1]]), np.array([100.0])
+    moved, _ = restore_areas(corners, ring, turn, sides, area, np.full(5, 2.0), np.zeros(1))
+    assert np.allclose(moved, 1.25 * (corners - 4.0) + 4.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("size", [2.0, 5.0])
