@@ -28,6 +28,7 @@ BAD = 0.35  # the pattern search works on rings below this
 SHORT = 0.25  # of the longest edge at a node: the pattern search makes no edge there shorter, for angles alone
 POWER = 4  # of the inverse mean ratio in Newton's energy
 HALVINGS = 6
+TINY = 1e-300
 
 
 class Rings(NamedTuple):
@@ -152,6 +153,17 @@ def is_sound(points: Points, rings: Rings, v: int, floor: float) -> bool:
         if at_v**2 < square * pv * vn or at_n**2 < square * vn * nd or at_p**2 < square * dp * pv:
             return False
     return True
+
+
+@verb
+def _felt_quality(points: Points, rings: Rings, v: int) -> float:
+    """Least sine of the corners around node v that feel where it is: all but those opposite to it."""
+    worst = 1.0
+    for i in range(rings.offsets[v], rings.offsets[v + 1]):
+        at_v, at_n, at_p, vn, nd, dp, pv = _turns(points, rings.quads, rings.corners[i])
+        sine = min(at_v / np.sqrt(pv * vn + TINY), at_n / np.sqrt(vn * nd + TINY))
+        worst = min(worst, min(sine, at_p / np.sqrt(dp * pv + TINY)))
+    return worst
 
 
 @verb
@@ -347,17 +359,21 @@ def _reach_of(points: Points, rings: Rings, v: int) -> tuple[float, float]:
 
 @kernel
 def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float) -> int:
-    """Raise the worst scaled Jacobian of rings below `bad` by a pattern search, in place; return the rings left bad."""
-    todo, low = nodes_of_poor(points, rings.quads, bad), np.zeros(len(points), np.bool_)
+    """Raise the worst corners that feel a node, where below `bad`, by a pattern search.
+
+    Corners opposite to the node do not count: where they are the worst, what it can do for the others would be missed.
+    Returns how many nodes are left with a quad below.
+    """
+    todo, seen = nodes_of_poor(points, rings.quads, bad), np.zeros(len(points), np.bool_)
     for _ in range(rounds):
         moved = False
         for v in range(len(points)):
             if not (todo[v] and free[v]) or rings.offsets[v] == rings.offsets[v + 1]:
                 continue
-            todo[v], low[v] = False, False
-            if is_ring_above(points, rings, v, bad):
+            todo[v], seen[v] = False, True
+            before = _felt_quality(points, rings, v)
+            if before >= bad:
                 continue
-            before = ring_quality(points, rings, v)
             best = before
             shortest, longest = _reach_of(points, rings, v)
             room, step = min(shortest, SHORT * longest), 0.3 * longest
@@ -367,13 +383,12 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
                 for d in range(8):
                     points[v, 0] = x + step * np.cos(d * np.pi / 4)
                     points[v, 1] = y + step * np.sin(d * np.pi / 4)
-                    quality = ring_quality(points, rings, v)
+                    quality = _felt_quality(points, rings, v)
                     if quality > best + 1e-9 and (best <= 0.0 or _reach_of(points, rings, v)[0] >= room):
                         best, best_x, best_y = quality, points[v, 0], points[v, 1]
                 points[v, 0], points[v, 1] = best_x, best_y
                 if best_x == x and best_y == y:
                     step *= 0.5
-            low[v] = best < bad
             if best > before:
                 _activate_ring(todo, rings, v)
                 moved = True
@@ -381,7 +396,7 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
             break
     left = 0
     for v in range(len(points)):
-        left += low[v]
+        left += seen[v] and not is_ring_above(points, rings, v, bad)
     return left
 
 

@@ -160,6 +160,15 @@ def test_untangle_takes_out_a_fold(shift: tuple[float, float]) -> None:
     assert points[mesh.origin >= 0].tobytes() == folded[mesh.origin >= 0].tobytes()
 
 
+def test_untangle_raises_corners_beside_a_worse_one_that_does_not_feel_the_node() -> None:
+    points = np.array([[0.0, 0.0], [4.0, 0.0], [4.6, 0.5], [-1.2, 0.3]])
+    quad = np.array([[0, 1, 2, 3]])
+    (opposite, *felt), after = naive.corner_sines(points, quad)[0], points.copy()
+    untangle(after, rings_of(quad, 4), np.arange(4) == 2, 2, 0.9)
+    assert opposite < min(felt)
+    assert naive.corner_sines(after, quad)[0, 1:].min() > min(felt) + 0.2
+
+
 def test_untangle_counts_what_it_cannot_help() -> None:
     mesh = grid(4, 4)
     points = mesh.points.copy()
