@@ -29,6 +29,7 @@ SHORT = 0.25  # of the longest edge at a node: the pattern search makes no edge 
 POWER = 4  # of the inverse mean ratio in Newton's energy
 HALVINGS = 6
 TINY = 1e-300
+WAYS = np.array([[np.cos(d * np.pi / 4), np.sin(d * np.pi / 4)] for d in range(8)])  # of the pattern search
 
 
 class Rings(NamedTuple):
@@ -156,13 +157,18 @@ def is_sound(points: Points, rings: Rings, v: int, floor: float) -> bool:
 
 
 @verb
-def _felt_quality(points: Points, rings: Rings, v: int) -> float:
-    """Least sine of the corners around node v that feel where it is: all but those opposite to it."""
+def _felt_quality(points: Points, rings: Rings, v: int, floor: float) -> float:
+    """Least sine of the corners around node v that feel where it is, or one that is not above `floor`.
+
+    The corners opposite to it do not.
+    """
     worst = 1.0
     for i in range(rings.offsets[v], rings.offsets[v + 1]):
         at_v, at_n, at_p, vn, nd, dp, pv = _turns(points, rings.quads, rings.corners[i])
         sine = min(at_v / np.sqrt(pv * vn + TINY), at_n / np.sqrt(vn * nd + TINY))
         worst = min(worst, min(sine, at_p / np.sqrt(dp * pv + TINY)))
+        if worst <= floor:
+            break
     return worst
 
 
@@ -371,7 +377,7 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
             if not (todo[v] and free[v]) or rings.offsets[v] == rings.offsets[v + 1]:
                 continue
             todo[v], seen[v] = False, True
-            before = _felt_quality(points, rings, v)
+            before = _felt_quality(points, rings, v, -1.0)
             if before >= bad:
                 continue
             best = before
@@ -381,9 +387,8 @@ def untangle(points: Points, rings: Rings, free: Flags, rounds: int, bad: float)
                 x, y = points[v, 0], points[v, 1]
                 best_x, best_y = x, y
                 for d in range(8):
-                    points[v, 0] = x + step * np.cos(d * np.pi / 4)
-                    points[v, 1] = y + step * np.sin(d * np.pi / 4)
-                    quality = _felt_quality(points, rings, v)
+                    points[v, 0], points[v, 1] = x + step * WAYS[d, 0], y + step * WAYS[d, 1]
+                    quality = _felt_quality(points, rings, v, best)
                     if quality > best + 1e-9 and (best <= 0.0 or _reach_of(points, rings, v)[0] >= room):
                         best, best_x, best_y = quality, points[v, 0], points[v, 1]
                 points[v, 0], points[v, 1] = best_x, best_y
