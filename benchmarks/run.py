@@ -1,6 +1,6 @@
 """Run the benchmarks and put their tables into docs/benchmarks.md.
 
-    python benchmarks/run.py                      quality, speed, growth, cold: about 10 minutes
+    python benchmarks/run.py                      quality, wedges, speed, growth, cold: about 10 minutes
     python benchmarks/run.py speed cold           some parts; the others' tables stay as they are
     python benchmarks/run.py all                  all: pictures and noise take about 15 and 10 minutes more
     python benchmarks/run.py --out docs/benchmarks.md
@@ -27,17 +27,19 @@ import noise
 import quality
 import real_pictures
 import speed
+import wedges
 from imgquad_mesh.report import versions
 
 PARTS: dict[str, Callable[[Path], str]] = {
     "quality": quality.section,
+    "wedges": wedges.section,
     "speed": speed.section,
     "growth": growth.section,
     "cold": cold_start.section,
     "pictures": real_pictures.section,
     "noise": noise.section,
 }
-STANDARD = ("quality", "speed", "growth", "cold")
+STANDARD = ("quality", "wedges", "speed", "growth", "cold")
 
 
 def main() -> None:
