@@ -26,6 +26,7 @@ Flags = NDArray[np.bool_]
 
 
 MOST_SHORT = 0.25  # share of the chains around a face that may be halved for the sake of stride 4
+SHORTEST = 0.45  # edge that is halved for the sake of one face, over the mean edge around it
 
 
 class Segments(NamedTuple):
@@ -102,7 +103,10 @@ def _cut_corners(graph: BoundaryGraph, stride: int) -> Flags:
 
 
 def with_short_chains_halved(graph: BoundaryGraph, least_width: float) -> BoundaryGraph:
-    """Return the graph with 4 edges on chains of 2, where nothing else keeps the faces beside them from stride 4."""
+    """Return the graph with 4 edges on chains of 2, where nothing else keeps the faces beside them from stride 4.
+
+    Where that is of use for the face on one side only, the edges must not be very short for it.
+    """
     edges = _edges(graph)
     segments = coarse_segments(graph, edges % 4 == 0, 4)
     length = np.hypot(*(graph.points[segments.head] - graph.points[segments.tail]).T)
@@ -113,7 +117,9 @@ def with_short_chains_halved(graph: BoundaryGraph, least_width: float) -> Bounda
     short = edges == 2
     share = _per_face(graph, short) / np.maximum(_per_face(graph, np.ones(graph.n_chains, bool)), 1)
     hopeful &= share <= MOST_SHORT
-    return halved(graph, short & np.append(hopeful, True)[graph.chain_regions].all(axis=1))
+    usual = np.append(mean_edges(graph), 0.0)[graph.chain_regions].max(axis=1)
+    for_both, for_one = np.append(hopeful, True)[graph.chain_regions].all(axis=1), chains_of(graph, hopeful)
+    return halved(graph, short & (for_both | (for_one & (_lengths(graph) >= 2 * SHORTEST * usual))))
 
 
 def _edges(graph: BoundaryGraph) -> Ids:
@@ -146,10 +152,14 @@ def chains_in_conflict(graph: BoundaryGraph, segments: Segments, new: Flags) -> 
 
 def mean_edges(graph: BoundaryGraph) -> Points:
     """Return the mean length of the final edges around each face."""
-    ends = coarse_segments(graph, np.ones(graph.n_chains, bool), 1)
-    length = np.hypot(*(graph.points[ends.head] - graph.points[ends.tail]).T)
-    around, count = (np.bincount(ends.chain, weights, graph.n_chains) for weights in (length, None))
-    return np.asarray(_per_face(graph, around) / np.maximum(_per_face(graph, count), 1))
+    return np.asarray(_per_face(graph, _lengths(graph)) / np.maximum(_per_face(graph, _edges(graph)), 1))
+
+
+def _lengths(graph: BoundaryGraph) -> Points:
+    """Return the length of each chain."""
+    edges = coarse_segments(graph, np.ones(graph.n_chains, bool), 1)
+    length = np.hypot(*(graph.points[edges.head] - graph.points[edges.tail]).T)
+    return np.bincount(edges.chain, length, graph.n_chains)
 
 
 def _width(graph: BoundaryGraph, segments: Segments, length: Points) -> Points:

@@ -20,6 +20,7 @@ from imgquad_core.curves import Curves, Flags, Floats, Ints
 from imgquad_core.jit import kernel, verb
 
 _LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
+_SHORT = 0.7  # the same beside a corner: a short piece there would keep both faces of a long chain from that
 _COARSE = 0.6  # mean size over asked size from which that is of use
 _VERY_LONG = 30.0  # coarse segments from which their number may be made a multiple of six
 _SWEEPS = 3
@@ -91,7 +92,7 @@ def place_nodes(
             if i < last and not is_corner[i] and not exact[c]:
                 continue
             least = -(-at_least[c] // pieces)
-            number = 1 if exact[c] else _count(curves, cost, limit, begin, i, least, in_twelves)
+            number = 1 if exact[c] else _count(curves, cost, limit, is_corner, begin, i, least, in_twelves)
             _divide(cost, begin, i, 2 * number, at, n)
             n += 2 * number
             corner[n] = is_corner[i]
@@ -101,13 +102,16 @@ def place_nodes(
 
 
 @verb
-def _count(curves: Curves, cost: Floats, limit: Floats, begin: int, end: int, least: int, in_twelves: bool) -> int:
+def _count(
+    curves: Curves, cost: Floats, limit: Floats, is_corner: Flags, begin: int, end: int, least: int, in_twelves: bool
+) -> int:
     """Choose the number of coarse segments of a piece."""
     total = 0.5 * (cost[end] - cost[begin])
     length = curves.arc[end] - curves.arc[begin]
-    if total > _LONG and length > 2 * _COARSE * total * limit[begin]:
+    enough = _SHORT if is_corner[begin] or is_corner[end] else _LONG
+    if total > enough and length > 2 * _COARSE * total * limit[begin]:
         step = 6 if in_twelves and total > _VERY_LONG else 2
-        return max(step * int(total / step + 0.5), step * ((least + step - 1) // step))
+        return step * max(int(total / step + 0.5), max((least + step - 1) // step, 1))
     return max(int(np.ceil(total - 0.3)), least)
 
 

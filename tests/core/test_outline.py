@@ -18,6 +18,7 @@ from imgquad_core.outline import (
     refined,
     wide_faces,
     with_chains_of,
+    with_short_chains_halved,
     without_unused_points,
 )
 
@@ -154,6 +155,33 @@ def test_halved_chains_gain_mid_points_behind_all_others() -> None:
     assert np.array_equal(fine.point_kind[n:], np.where(on_frame, PointKind.FRAME, PointKind.FREE))
     assert on_frame.any()
     assert len(np.unique(fine.chain_points)) == len(fine.points)
+
+
+def beside_a_strip(height: float, edges: int) -> BoundaryGraph:
+    """A square, and on its right a strip of two materials that meet at y = height."""
+    h = height
+    ways = [
+        ([[32, h], [32, 32]], 16, (0, 1)),
+        ([[32, 0], [32, h]], edges, (0, 2)),
+        ([[32, 32], [0, 32], [0, 0]], 16, (0, VOID)),
+        ([[0, 0], [32, 0]], 16, (0, VOID)),
+        ([[32, h], [34, h]], 2, (1, 2)),
+        ([[34, h], [34, 32], [32, 32]], 8, (1, VOID)),
+        ([[32, 0], [34, 0], [34, h]], 2, (2, VOID)),
+    ]
+    points: dict[tuple[float, float], int] = {}
+    chains = []
+    for way, n, _ in ways:
+        line = [p for a, b in pairwise(way) for p in np.linspace(a, b, n, endpoint=False).tolist()] + [way[-1]]
+        chains.append([points.setdefault((float(x), float(y)), len(points)) for x, y in line])
+    return graph_of([*points], chains, [sides for *_, sides in ways], (32, 34))
+
+
+def test_short_chains_are_halved_for_the_wide_face_beside_them_unless_edges_get_tiny() -> None:
+    for height, edges, expected in ((3.0, 2, 4), (1.0, 2, 2), (3.0, 6, 6)):
+        graph = beside_a_strip(height, edges)
+        finer = np.diff(with_short_chains_halved(graph, 3.0).chain_offsets) - 1
+        assert finer.tolist() == [16, expected, 32, 16, 2, 16, 4]
 
 
 def test_halving_nothing_changes_nothing() -> None:

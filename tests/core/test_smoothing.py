@@ -194,6 +194,17 @@ def test_areas_are_given_back_without_turning_the_sides_of_corners() -> None:
     assert np.allclose(moved, 1.25 * (corners - 4.0) + 4.0, atol=1e-3)
 
 
+def test_a_corner_near_an_end_keeps_no_face_from_the_coarse_level() -> None:
+    labels = np.zeros((60, 80), int)
+    labels[7:, 40:] = 1
+    labels[:7, 60:] = 1  # the boundary turns 7 px below the border, less than two edges of 4
+    graph = smoothed(labels, 4.0)
+    chain = graph.chain(int(np.flatnonzero((graph.chain_regions >= 0).all(axis=1))[0]))
+    places = np.flatnonzero(graph.point_kind[chain[1:-1]] == PointKind.CORNER) + 1
+    assert len(places) == 2
+    assert (places % 4 == 0).all()
+
+
 @pytest.mark.parametrize("size", [2.0, 5.0])
 def test_regions_of_fifty_pixels_keep_their_areas(size: float) -> None:
     graph = smoothed(voronoi(200, 200, 60, 5), size)
