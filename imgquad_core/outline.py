@@ -159,7 +159,7 @@ def _lengths(graph: BoundaryGraph) -> Points:
     """Return the length of each chain."""
     edges = coarse_segments(graph, np.ones(graph.n_chains, bool), 1)
     length = np.hypot(*(graph.points[edges.head] - graph.points[edges.tail]).T)
-    return np.bincount(edges.chain, length, graph.n_chains)
+    return np.asarray(np.bincount(edges.chain, length, graph.n_chains), np.float64)
 
 
 def _width(graph: BoundaryGraph, segments: Segments, length: Points) -> Points:
