@@ -11,7 +11,7 @@ from imgquad_core.clearance import CROSSING, find_conflicts, mark_sharp
 from imgquad_core.curves import Curves, Ends, Flags, Floats, Ints
 from imgquad_core.placement import Placement
 
-_LEAST_SECTOR = np.radians(30.0)
+_LEAST_SECTOR = np.radians(35.0)  # sharper sectors are blunted; tips of chains are rounded below 37 degrees
 
 
 class Nodes(NamedTuple):

@@ -1,6 +1,6 @@
 """Nodes without conflicts: placed, tested exactly, and drawn back towards the pixel boundary where they fail.
 
-Where polylines cross, come too close or meet at less than 30 degrees, the wanted edges get shorter and the curve is
+Where polylines cross, come too close or meet at less than 35 degrees, the wanted edges get shorter and the curve is
 blended by thirds with the pixel boundary, which has gaps of 0.7 px everywhere. Chains that still fail in the end get
 exactly their pixels' points: these never cross, so the loop ends whatever the picture.
 """
@@ -61,7 +61,7 @@ def place_freely(draft: Draft, size: Floats) -> tuple[Nodes, bool]:
     Nodes
         Nodes whose fine and coarse polylines neither cross nor touch.
     bool
-        They also keep room, and sectors of 30 degrees.
+        They also keep room, and sectors of 35 degrees.
     """
     curves = draft.curves
     at_least = _least_segments(curves.ends)
