@@ -21,7 +21,7 @@ from imgquad_core.jit import kernel, verb
 
 _LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
 _SHORT = 0.7  # the same beside a corner: a short piece there would keep both faces of a long chain from that
-_COARSE = 0.6  # mean size over asked size from which that is of use
+_COARSE = 0.3  # mean size over asked size from which that is of use
 _VERY_LONG = 30.0  # coarse segments from which their number may be made a multiple of six
 _SWEEPS = 3
 
