@@ -13,7 +13,7 @@ from imgquad_core.fitting import quadratic_at
 from imgquad_core.jit import kernel, verb
 
 _SIDE = 6.0  # px of arc of each side
-_SIDES = np.array([26.0, 18.0, 12.0, 8.5, _SIDE])  # what is tried to measure a corner: the longest that are straight
+_SIDES = np.array([_SIDE, 26.0, 18.0, 12.0, 8.5, _SIDE])  # a first look; then the longest that are straight tell
 _NEAR = 0.4  # px beside the corner that are left out
 _STRAIGHT = 0.32  # px, largest residual (rms) of a side
 _TURN, _TIP = 0.8, 2.5  # radians, least and largest turn between the sides; beyond it is the round tip of a line
@@ -120,14 +120,13 @@ def _corner_at(curves: Curves, c: int, i: int, lengths: Floats) -> tuple[float, 
     The longest sides that are straight tell: lines through 6 px of pixel stairs are off by up to 6 degrees.
     """
     step = curves.ends.shape[1] - 1  # 1, but not a literal: those are compiled for on their own
-    n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, _SIDE)
-    m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, _SIDE)
-    if n < 6 or m < 6 or max(rms_u, rms_v) > _STRAIGHT or _turn(ux, uy, vx, vy) < _TURN:
-        return 0.0, 0.0, 0.0
-    for far in lengths:
-        n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, far)
-        m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, far)
-        if max(rms_u, rms_v) <= _STRAIGHT:
+    for k in range(len(lengths)):
+        n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, lengths[k])
+        m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, lengths[k])
+        is_straight = max(rms_u, rms_v) <= _STRAIGHT
+        if k == 0 and (n < 6 or m < 6 or not is_straight or _turn(ux, uy, vx, vy) < _TURN):
+            return 0.0, 0.0, 0.0
+        if k > 0 and is_straight:
             break
     if not _TURN <= _turn(ux, uy, vx, vy) <= _TIP:
         return 0.0, 0.0, 0.0
