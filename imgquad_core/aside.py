@@ -31,7 +31,8 @@ def start() -> subprocess.Popen[bytes] | None:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, folders))}
     try:
         none = subprocess.DEVNULL
-        return subprocess.Popen([interpreter, "-m", __name__], env=environment, stdin=none, stdout=none, stderr=none)
+        command = [str(interpreter), "-P", "-m", __name__]  # -P: not the package of a clone that is the current folder
+        return subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=none)
     except OSError:
         return None
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from imgquad_core import aside
 from imgquad_core.jit import inlined, kernel, verb
 
 
@@ -81,6 +82,19 @@ print(share_on_disk() > aside.FIRST_START)
 def test_the_second_process_compiles_what_the_first_one_calls() -> None:
     done = subprocess.run([sys.executable, "-c", ASIDE], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == ["[]", "['_clean_pass', '_repair_pass', 'newton', 'slide']", "True"]
+
+
+def test_the_second_process_is_of_this_package_in_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clone = tmp_path / "imgquad_core"  # as in a clone of the repository, while another copy is installed
+    clone.mkdir()
+    (clone / "__init__.py").touch()
+    (clone / "aside.py").write_text("raise SystemExit(3)", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(aside, "share_on_disk", lambda: 0.0)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    process = aside.start.__wrapped__()
+    assert process is not None
+    assert process.wait(aside.LONGEST) == 0
 
 
 def test_arrays_that_may_be_read_only_compile_no_kernel_again() -> None:
