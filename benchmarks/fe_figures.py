@@ -24,11 +24,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from ccx import solve
 from handmade import disk, staircase
-from imgquad_core.femesh import FEMesh
+from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.fe.second_order import second_order
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import QuadMesh
-from imgquad_core.pipeline import MeshOptions, mesh_image
-from imgquad_core.second_order import second_order
-from imgquad_core.sets import fe_mesh
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import mesh_image
 from imgquad_core.writers import write_mesh
 
 Floats = NDArray[np.float64]

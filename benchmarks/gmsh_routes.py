@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from imgquad_core.measures.quality import quad_areas, quality_report
 from imgquad_core.model import Materials, PointKind, QuadMesh
-from imgquad_core.quality import quad_areas, quality_report
 
 Ids = NDArray[np.int64]
 LINE, QUAD = 1, 3  #: Gmsh's numbers of element types
@@ -160,8 +160,8 @@ def _taken_back(mesh: Any) -> tuple[QuadMesh, int]:
 def main(path: str, route: str) -> None:
     import pyvista as pv
 
-    from imgquad_mesh.grids import to_mesh
-    from imgquad_mesh.report import peak_memory_mb
+    from imgquad_mesh.datasets.grids import to_mesh
+    from imgquad_mesh.outputs.report import peak_memory_mb
 
     made = gmsh_mesh(to_mesh(pv.read(path))[0], route)
     figures = {"seconds": made.seconds, "cpu": made.cpu, "not_quads": made.not_quads}

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from figure_tables import FIGURES, Limit, limit_table, ours, row, table, theirs
 from gmsh_routes import ROUTES
-from imgquad_core.meshing import EFFORTS
+from imgquad_core.mesher.efforts import EFFORTS
 from processes import FailedError, answer, mesh_picture
 from rocks import HAS_GENERATOR, SOURCE, draw_rock
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from imgquad_mesh.drawing import rock_labels
+from imgquad_mesh.cli.rock_picture import rock_labels
 from processes import ROOT
 
 #: the generator of B1 and B2; it is not part of this repository

@@ -28,7 +28,7 @@ import quality
 import real_pictures
 import speed
 import wedges
-from imgquad_mesh.report import versions
+from imgquad_mesh.outputs.report import versions
 
 PARTS: dict[str, Callable[[Path], str]] = {
     "quality": quality.section,

@@ -17,14 +17,15 @@ from time import perf_counter, process_time
 from typing import Any
 
 from figure_tables import Limit, limit_table, table
-from imgquad_core.boundary import extract_boundaries
-from imgquad_core.meshing import EFFORTS, mesh_boundaries
-from imgquad_core.pipeline import MeshOptions
-from imgquad_core.quality import quality_report
-from imgquad_core.reading import read_picture
-from imgquad_core.segmentation import segment_picture
-from imgquad_core.selection import crop_image
-from imgquad_core.smoothing import smooth_boundaries
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.boundary.smoothing import smooth_boundaries
+from imgquad_core.measures.quality import quality_report
+from imgquad_core.mesher.efforts import EFFORTS
+from imgquad_core.mesher.meshing import mesh_boundaries
+from imgquad_core.options import MeshOptions
+from imgquad_core.picture.reading import read_picture
+from imgquad_core.picture.segmentation import segment_picture
+from imgquad_core.picture.selection import crop_image
 from processes import answer, mesh_picture
 from quality import BEST_ROUTE, ROCKS, SIDE, SIZE
 from rocks import SOURCE, draw_rock

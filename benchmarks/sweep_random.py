@@ -17,12 +17,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from imgquad_core.boundary import extract_boundaries
-from imgquad_core.meshing import EFFORTS, mesh_boundaries
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.boundary.smoothing import smooth_boundaries
+from imgquad_core.measures.quality import scaled_jacobian
+from imgquad_core.mesher.efforts import EFFORTS
+from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import QuadMesh
-from imgquad_core.pipeline import MeshOptions
-from imgquad_core.quality import scaled_jacobian
-from imgquad_core.smoothing import smooth_boundaries
+from imgquad_core.options import MeshOptions
 from invariants import assert_valid_mesh
 from shapes import KINDS, Labels, label_image, labels_of_kind
 

@@ -15,11 +15,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from figure_tables import table
-from imgquad_core.boundary import extract_boundaries
-from imgquad_core.meshing import mesh_boundaries
-from imgquad_core.pipeline import MeshOptions
-from imgquad_core.quality import scaled_jacobian
-from imgquad_core.smoothing import smooth_boundaries
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.boundary.smoothing import smooth_boundaries
+from imgquad_core.measures.quality import scaled_jacobian
+from imgquad_core.mesher.meshing import mesh_boundaries
+from imgquad_core.options import MeshOptions
 from shapes import label_image, wedge
 
 ANGLES = (15, 20, 30, 40, 45, 50, 60, 70, 80, 90)  # degrees

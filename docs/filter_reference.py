@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from imgquad_mesh.templates import markdown
+from imgquad_mesh.meshlab.templates import markdown
 
 HEAD = """# Reference of the filters
 

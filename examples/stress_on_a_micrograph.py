@@ -19,7 +19,7 @@ import pyvista as pv
 
 from imgquad_core import MeshOptions, mesh_image
 from imgquad_core.writers import write_mesh
-from imgquad_mesh.drawing import rock_picture
+from imgquad_mesh.cli.rock_picture import rock_picture
 
 
 def main(folder: Path) -> None:

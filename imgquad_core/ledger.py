@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .boundary.areas import enclosed_areas
+from .measures.quality import region_areas
 from .model import VOID, BoundaryGraph, LabelImage, QuadMesh
-from .quality import region_areas
-from .smoothing import region_areas as enclosed_areas
 
 #: regions of this many pixels or more keep their area
 LARGE_REGION = 50

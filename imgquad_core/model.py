@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import Bytes, Floats, Ints, Labels
+
 VOID = -1  #: label of a pixel, or region beside a chain, that is not meshed
 
 
@@ -47,9 +49,9 @@ class Materials:
         RGB of each material, in the order of `labels`.
     """
 
-    labels: NDArray[np.int32]
+    labels: Labels
     names: tuple[str, ...]
-    colors: NDArray[np.uint8]
+    colors: Bytes
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "labels", _frozen(self.labels, np.int32, 1))
@@ -74,7 +76,7 @@ class LabelImage:
         Number, name and colour of each material that occurs (and perhaps of more).
     """
 
-    labels: NDArray[np.int32]
+    labels: Labels
     materials: Materials
 
     def __post_init__(self) -> None:
@@ -116,13 +118,13 @@ class BoundaryGraph:
     (the coarse nodes) form a planar graph by themselves, as do all points.
     """
 
-    points: NDArray[np.float64]
-    point_kind: NDArray[np.uint8]
-    chain_offsets: NDArray[np.int64]
-    chain_points: NDArray[np.int64]
-    chain_regions: NDArray[np.int64]
-    region_label: NDArray[np.int32]
-    region_pixels: NDArray[np.int64]
+    points: Floats
+    point_kind: Bytes
+    chain_offsets: Ints
+    chain_points: Ints
+    chain_regions: Ints
+    region_label: Labels
+    region_pixels: Ints
     shape: tuple[int, int]
 
     def __post_init__(self) -> None:
@@ -142,12 +144,12 @@ class BoundaryGraph:
         """Number of chains."""
         return len(self.chain_offsets) - 1
 
-    def chain(self, c: int) -> NDArray[np.int64]:
+    def chain(self, c: int) -> Ints:
         """Ids of the points of chain `c`, in order."""
         return self.chain_points[self.chain_offsets[c] : self.chain_offsets[c + 1]]
 
     @cached_property
-    def segments(self) -> NDArray[np.int64]:
+    def segments(self) -> Ints:
         """All segments of all chains as point ids, shape (n_segments, 2), chain by chain."""
         return chain_segments(self.chain_offsets, self.chain_points)
 
@@ -174,14 +176,14 @@ class QuadMesh:
         Number, name and colour of the materials.
     """
 
-    points: NDArray[np.float64]
-    point_kind: NDArray[np.uint8]
-    quads: NDArray[np.int64]
-    quad_region: NDArray[np.int64]
-    region_label: NDArray[np.int32]
-    chain_offsets: NDArray[np.int64]
-    chain_points: NDArray[np.int64]
-    chain_regions: NDArray[np.int64]
+    points: Floats
+    point_kind: Bytes
+    quads: Ints
+    quad_region: Ints
+    region_label: Labels
+    chain_offsets: Ints
+    chain_points: Ints
+    chain_regions: Ints
     materials: Materials
 
     def __post_init__(self) -> None:
@@ -208,17 +210,17 @@ class QuadMesh:
         return len(self.quads)
 
     @cached_property
-    def quad_material(self) -> NDArray[np.int32]:
+    def quad_material(self) -> Labels:
         """Material of each quad, int32, shape (n_quads,)."""
         return self.region_label[self.quad_region]
 
     @cached_property
-    def constraints(self) -> NDArray[np.int64]:
+    def constraints(self) -> Ints:
         """Edges that lie on a chain, shape (n, 2), chain by chain."""
         return chain_segments(self.chain_offsets, self.chain_points)
 
     @cached_property
-    def valence(self) -> NDArray[np.int64]:
+    def valence(self) -> Ints:
         """Number of quads at each point."""
         return np.bincount(self.quads.ravel(), minlength=self.n_points)
 
@@ -227,9 +229,9 @@ class QuadMesh:
         return replace(self, points=self.points * factor)
 
 
-def chain_segments(offsets: NDArray[np.int64], points: NDArray[np.int64]) -> NDArray[np.int64]:
+def chain_segments(offsets: Ints, points: Ints) -> Ints:
     """Return consecutive pairs of points within each chain, shape (n, 2)."""
-    pairs: NDArray[np.int64] = np.stack([points[:-1], points[1:]], axis=1)
+    pairs: Ints = np.stack([points[:-1], points[1:]], axis=1)
     inside = np.ones(max(len(points) - 1, 0), bool)
     inside[offsets[1:-1] - 1] = False
     return np.ascontiguousarray(pairs[inside])

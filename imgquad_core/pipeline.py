@@ -3,158 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from math import isfinite
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from types import MappingProxyType
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import aside
-from .boundary import ExtractionOptions, extract_boundaries
-from .denoise import DenoiseOptions, Removal, automatic_limits, list_removed, remove_noise
+from . import ahead
+from .boundary.extraction import ExtractionOptions, extract_boundaries
+from .boundary.periodic import match_opposite_sides, rematch
+from .boundary.smoothing import SmoothingOptions, smooth_boundaries
 from .errors import InputError
-from .meshing import EFFORTS, MeshingOptions, mesh_boundaries
+from .mesher.efforts import MeshingOptions
+from .mesher.meshing import mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
-from .periodic import DIRECTIONS, match_opposite_sides, rematch
-from .reading import Picture, ReadOptions, read_picture
-from .segmentation import Segmentation, SegmentationOptions, segment_picture
-from .selection import Box, assert_solid, crop_image, drop_materials, material_number
-from .smoothing import SmoothingOptions, smooth_boundaries
+from .options import MeshOptions
+from .picture.noise import DenoiseOptions, Removal, list_removed, remove_noise
+from .picture.reading import Picture, ReadOptions, read_picture
+from .picture.segmentation import Segmentation, segment_picture
+from .picture.selection import assert_solid, crop_image, drop_materials, material_number
 
 T = TypeVar("T")
 Source: TypeAlias = "str | Path | NDArray[Any] | LabelImage"
 #: called with the name of the stage that starts, its number from 0, and the number of stages
 Progress: TypeAlias = Callable[[str, int, int], None]
-
 STAGES = ("read", "segment", "denoise", "boundary", "smooth", "mesh")
 MOST_QUADS = 200_000_000  #: more are refused before memory is
 MANY_TIMES, MANY_QUADS = 4.0, 1000  #: quads over area / size^2, and in all, from which thin features are told
-
-
-@dataclass(frozen=True)
-class MeshOptions:
-    """How a picture is meshed. Lengths are in pixels.
-
-    Parameters
-    ----------
-    size : float
-        Length of the final edges.
-    boundary_size : float, optional
-        The same on boundaries; `size` by default.
-    material_sizes : mapping of (str or int) to float
-        The same in single materials, by name or number.
-    growth : float
-        Largest ratio of the sizes of neighbouring elements.
-    colors : "auto", "exact", int or sequence of RGB
-        How colours become materials; see `SegmentationOptions`.
-    min_pixels : "auto" or int
-        Clusters of fewer pixels are noise if they are also shorter than `min_length`.
-    min_length : "auto" or float
-        Characteristic length of the shortest cluster that stays. `auto` leaves exact label pictures as they are.
-    policy : str
-        Which pair is joined at an ambiguous corner of four pixels; see `ExtractionOptions`.
-    edge_ratio : float
-        Largest ratio of the lengths of neighbouring edges on a boundary.
-    max_shift : float
-        How far smoothing moves a boundary at most.
-    pixel_size : float
-        Length of a pixel in the unit of the mesh.
-    drop : sequence of str or int
-        Materials that are left out: their boundary becomes a free border.
-    drop_transparent : bool
-        Whether pixels of alpha 0 are left out too.
-    crop : tuple of int, optional
-        Left, upper, right, lower bound of the part that is meshed, from the picture's upper left corner.
-    frame : int, optional
-        Which picture of a stack, counted from 0.
-    periodic : "none", "x", "y" or "xy"
-        Opposite sides get nodes at the same places, for a periodic cell; see `match_opposite_sides`.
-    max_pixels : int
-        Larger pictures are refused.
-    effort : "fast", "normal" or "best"
-        How far the mesh is optimised.
-    threads : int
-        Number of threads of the meshing stage; the mesh does not depend on it.
-    """
-
-    size: float = 4.0
-    boundary_size: float | None = None
-    material_sizes: Mapping[str | int, float] = field(default_factory=lambda: MappingProxyType({}))
-    growth: float = 1.3
-    colors: Any = "auto"
-    min_pixels: int | Literal["auto"] = "auto"
-    min_length: float | Literal["auto"] = "auto"
-    policy: str = "minority"
-    edge_ratio: float = 1.2
-    max_shift: float = 1.0
-    pixel_size: float = 1.0
-    drop: tuple[str | int, ...] = ()
-    drop_transparent: bool = False
-    crop: Box | None = None
-    periodic: str = "none"
-    frame: int | None = None
-    max_pixels: int = ReadOptions.max_pixels
-    effort: str = "normal"
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.pixel_size) and self.pixel_size > 0):
-            raise InputError(f"pixel_size is {self.pixel_size}: give a length above 0")
-        if self.periodic not in ("none", *DIRECTIONS):
-            raise InputError(f"periodic is '{self.periodic}': give none, x, y or xy")
-        # each stage checks its own options: now, not after minutes of work
-        self.meshing(None)
-        self.smoothing(None)
-        self.segmentation()
-        self.noise(True, (1, 1))
-        ReadOptions(self.max_pixels, self.frame)
-        ExtractionOptions(self.policy)
-
-    def segmentation(self) -> SegmentationOptions:
-        """Return the options of segmentation."""
-        return SegmentationOptions(colors=self.colors, drop_transparent=self.drop_transparent)
-
-    def noise(self, quantised: bool, shape: tuple[int, int]) -> DenoiseOptions:
-        """Return the limits of noise in a picture of `shape`."""
-        auto = automatic_limits(quantised, shape)
-        asked = (self.min_pixels, self.min_length)
-        if asked != ("auto", "auto") and "auto" in asked and not auto.removes:
-            auto = automatic_limits(True, shape)  # one limit asked for switches noise removal on
-        return DenoiseOptions(
-            min_pixels=auto.min_pixels if self.min_pixels == "auto" else self.min_pixels,
-            min_length=auto.min_length if self.min_length == "auto" else self.min_length,
-        )
-
-    def smoothing(self, materials: Materials | None) -> SmoothingOptions:
-        """Return the options of smoothing."""
-        return SmoothingOptions(
-            size=self.size,
-            boundary_size=self.boundary_size,
-            growth=self.growth,
-            edge_ratio=self.edge_ratio,
-            max_shift=self.max_shift,
-            material_sizes=self._sizes(materials),
-            in_twelves=EFFORTS[self.effort].in_nine,
-        )
-
-    def meshing(self, materials: Materials | None) -> MeshingOptions:
-        """Return the options of meshing."""
-        return MeshingOptions(
-            size=self.size,
-            growth=self.growth,
-            material_sizes=self._sizes(materials),
-            effort=self.effort,
-            threads=self.threads,
-        )
-
-    def _sizes(self, materials: Materials | None) -> dict[int, float]:
-        if materials is None:  # only the values are checked
-            return dict(enumerate(self.material_sizes.values()))
-        return {material_number(materials, name): size for name, size in self.material_sizes.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +117,7 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     progress : callable, optional
         Called as each stage starts.
     """
-    aside.start()
+    ahead.start()
     options = options or MeshOptions()
     timed = _Stopwatch(progress)
     raw = timed("read", read_source, source, ReadOptions(options.max_pixels, options.frame))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from imgquad_core.errors import InputError
-from imgquad_core.femesh import Floats, Ints, half_edge_twins
-from imgquad_core.model import VOID, Materials, PointKind, QuadMesh
+from .arrays import Bytes, Flags, Floats, Ints, Labels
+from .errors import InputError
+from .fe.femesh import half_edge_twins
+from .model import VOID, Materials, PointKind, QuadMesh
 
 SHARP = np.cos(np.radians(50.0))  #: a boundary that turns more at a node has a corner there
 
@@ -91,7 +92,7 @@ def _assert_manifold(quads: Ints, n_points: int) -> None:
         raise InputError(f"the edge between points {a} and {b} belongs to more than two quads, or quads overlap there")
 
 
-def _regions(twin: Ints, label: NDArray[np.int32]) -> tuple[Ints, NDArray[np.int32]]:
+def _regions(twin: Ints, label: Labels) -> tuple[Ints, Labels]:
     """Find connected parts of one material, numbered by their first quads."""
     half = np.flatnonzero(twin >= 0)
     half = half[label[half // 4] == label[twin[half] // 4]]
@@ -103,7 +104,7 @@ def _regions(twin: Ints, label: NDArray[np.int32]) -> tuple[Ints, NDArray[np.int
     return rank[region.ravel()], label[np.sort(first)]
 
 
-def _kinds(points: Floats, edges: Ints) -> NDArray[np.uint8]:
+def _kinds(points: Floats, edges: Ints) -> Bytes:
     degree = np.bincount(edges.ravel(), minlength=len(points))
     kind = np.full(len(points), PointKind.INTERIOR, np.uint8)
     kind[degree == 2] = PointKind.FREE
@@ -116,7 +117,7 @@ def _kinds(points: Floats, edges: Ints) -> NDArray[np.uint8]:
     return kind
 
 
-def _is_sharp(points: Floats, edges: Ints, degree: Ints) -> NDArray[np.bool_]:
+def _is_sharp(points: Floats, edges: Ints, degree: Ints) -> Flags:
     """Points between two edges at less than 130 degrees."""
     along = points[edges[:, 1]] - points[edges[:, 0]]
     along = along / np.linalg.norm(along, axis=1)[:, None]
@@ -125,11 +126,11 @@ def _is_sharp(points: Floats, edges: Ints, degree: Ints) -> NDArray[np.bool_]:
     np.add.at(to_both, edges[:, 0], along)
     np.add.at(to_both, edges[:, 1], -along)
     cosine = 1 - (to_both**2).sum(axis=1) / 2  # of the turn
-    sharp: NDArray[np.bool_] = (degree == 2) & (cosine < SHARP)
+    sharp: Flags = (degree == 2) & (cosine < SHARP)
     return sharp
 
 
-def _walk(edges: Ints, kind: NDArray[np.uint8], n_points: int) -> tuple[list[Ints], list[tuple[int, bool]]]:
+def _walk(edges: Ints, kind: Bytes, n_points: int) -> tuple[list[Ints], list[tuple[int, bool]]]:
     """Chains from junction to junction, then closed ones; of each its first edge and whether it runs along that."""
     ends = edges.ravel()
     order = np.argsort(ends, kind="stable")

@@ -10,14 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import Voronoi
 
 import naive
-from imgquad_core.composing import compose
-from imgquad_core.crossfield import cross_field
-from imgquad_core.cutting import CutMesh, FaceConflict, cut_at_constraints
-from imgquad_core.frontal import frontal_points
+from imgquad_core.cleanup.faces import FaceQuads
+from imgquad_core.mesher.composing import compose
+from imgquad_core.mesher.crossfield import cross_field
+from imgquad_core.mesher.cutting import CutMesh, FaceConflict, cut_at_constraints
+from imgquad_core.mesher.frontal import frontal_points
+from imgquad_core.mesher.outline import Outline, outline
+from imgquad_core.mesher.splitting import split_composed
+from imgquad_core.mesher.triangulation import triangulate
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
-from imgquad_core.outline import Outline, outline
-from imgquad_core.splitting import FaceQuads, split_composed
-from imgquad_core.triangulation import triangulate
 
 Ids = NDArray[np.int64]
 Points = NDArray[np.float64]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pymeshlab
 
-from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, script_text
+from imgquad_mesh.meshlab.mlx import Script, ScriptFilter, ScriptParameter, script_text
 from imgquad_mesh.spec import python_name
 
 NOT_APPLICABLE = Path(__file__).with_name("meshlab_filters.txt")

@@ -11,7 +11,7 @@ from figure_tables import Limit
 from gmsh_routes import ROUTES, coarse_curves, gmsh_mesh
 from growth import exponent
 from imgquad_core import MeshOptions, QuadMesh, mesh_image
-from imgquad_core.quality import quad_areas
+from imgquad_core.measures.quality import quad_areas
 from run import PARTS, replaced
 from shapes import voronoi
 from test_docs import DOCS

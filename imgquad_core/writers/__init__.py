@@ -9,17 +9,18 @@ from types import MappingProxyType
 from typing import Any
 
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh
+from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import QuadMesh
-from imgquad_core.sets import fe_mesh
-from imgquad_core.writers.abaqus import write_abaqus
-from imgquad_core.writers.archive import write_npz
-from imgquad_core.writers.converted import write_med, write_xdmf
-from imgquad_core.writers.drawings import write_dxf, write_svg
-from imgquad_core.writers.exodus import write_exodus
-from imgquad_core.writers.gmsh import write_gmsh
-from imgquad_core.writers.nastran import write_nastran
-from imgquad_core.writers.surfaces import write_obj, write_off, write_ply, write_stl
+
+from .abaqus.write import write_abaqus
+from .archive import write_npz
+from .converted import write_med, write_xdmf
+from .drawings import write_dxf, write_svg
+from .exodus import write_exodus
+from .gmsh import write_gmsh
+from .nastran import write_nastran
+from .surfaces import write_obj, write_off, write_ply, write_stl
 
 Writer = Callable[..., None]
 

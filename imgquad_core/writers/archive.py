@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from imgquad_core.femesh import FEMesh
-from imgquad_core.writers.common import replacing
+from imgquad_core.fe.femesh import FEMesh
+
+from .common import replacing
 
 
 def write_npz(mesh: FEMesh, path: str | Path) -> None:

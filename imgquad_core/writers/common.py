@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh, Names
+from imgquad_core.fe.femesh import FEMesh, Names
 
 ROWS_AT_ONCE = 20_000
 BYTES_AT_ONCE = 1 << 20

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh
-from imgquad_core.writers.common import points_3d, refuse_cohesive, refuse_six_nodes, replacing, take_room
-from imgquad_core.writers.gmsh import gmsh_text
+from imgquad_core.fe.femesh import FEMesh
+
+from .common import points_3d, refuse_cohesive, refuse_six_nodes, replacing, take_room
+from .gmsh import gmsh_text
 
 OVERHEAD = 200_000  #: bytes of an HDF5 file besides the arrays, at most
 MED_NAME_LIMIT = 80  #: Gmsh cuts longer ones off

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh, Ints
-from imgquad_core.writers.common import refuse_3d, rows, safe_names, write_text
+from imgquad_core.fe.femesh import FEMesh
+
+from .common import refuse_3d, rows, safe_names, write_text
 
 
 def write_svg(mesh: FEMesh, path: str | Path, *, stroke: float = 1.0) -> None:

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
-from imgquad_core.femesh import FEMesh, Ints
-from imgquad_core.writers.common import refuse_six_nodes, replacing, safe_names
+from imgquad_core.arrays import Ints
+from imgquad_core.fe.femesh import FEMesh
+
+from .common import refuse_six_nodes, replacing, safe_names
 
 NAME_LIMIT = 255
 ELEMENTS = {"quad4": "QUAD4", "quad8": "QUAD8", "quad9": "QUAD9", "hex8": "HEX8"}

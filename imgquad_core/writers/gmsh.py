@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imgquad_core.arrays import Floats, Ints
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh, Floats, Ints
-from imgquad_core.writers.common import points_3d, refuse_six_nodes, rows, safe_names, write_text
+from imgquad_core.fe.femesh import FEMesh
+
+from .common import points_3d, refuse_six_nodes, rows, safe_names, write_text
 
 NAME_LIMIT = 127
 ELEMENT_TYPES = {"point": 15, "line2": 1, "line3": 8, "quad4": 3, "quad8": 16, "quad9": 10, "hex8": 5}

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh, Ints
-from imgquad_core.properties import Properties, read_properties, values_of
-from imgquad_core.writers.common import points_3d, refuse_cohesive, rows, safe_names, write_text
+from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.fe.properties import Properties, read_properties, values_of
+
+from .common import points_3d, refuse_cohesive, rows, safe_names, write_text
 
 NAME_LIMIT = 60  # names stand in comments; a line has 80 columns
 ELEMENTS: Mapping[str, Mapping[str, str]] = {

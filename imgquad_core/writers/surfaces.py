@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from imgquad_core.femesh import FEMesh, Floats, Ints
-from imgquad_core.writers.common import refuse_3d, refuse_cohesive, replacing, rows, safe_names, write_text
+from imgquad_core.arrays import Bytes, Floats, Ints
+from imgquad_core.fe.femesh import FEMesh
+
+from .common import refuse_3d, refuse_cohesive, replacing, rows, safe_names, write_text
 
 
 def write_obj(mesh: FEMesh, path: str | Path) -> None:
@@ -66,7 +67,7 @@ def _corners(mesh: FEMesh, form: str) -> tuple[Floats, Ints]:
     return np.column_stack([mesh.points[used], np.zeros(len(used))]), quads.reshape(-1, 4)
 
 
-def _colors(mesh: FEMesh) -> NDArray[np.uint8]:
+def _colors(mesh: FEMesh) -> Bytes:
     """Colour of each quad; grey where a material has none."""
     at = np.searchsorted(mesh.materials.labels, mesh.cell_material)
     known = np.isin(mesh.cell_material, mesh.materials.labels)

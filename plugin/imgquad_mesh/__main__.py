@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from imgquad_core.errors import ImgquadError, InputError, QualityError
-from imgquad_mesh.cli import demo, filters, run, script
+
+from .cli import demo, list_filters, run, script
 
 GOOD, BUG, BAD_INPUT, LIMIT_NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
-COMMANDS = (run, demo, script, filters)
+COMMANDS = (run, demo, script, list_filters)
 
 
 class Parser(argparse.ArgumentParser):

@@ -13,11 +13,10 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 import pyvista as pv
 
+from . import filters
+
 if not hasattr(pv, "register_dataset_accessor"):
     raise ImportError(f"imgquad-mesh needs PyVista 0.48 or newer, this is {pv.__version__}: pip install -U pyvista")
-
-from imgquad_mesh import filters
-
 D = TypeVar("D")
 R = TypeVar("R")
 P = ParamSpec("P")

@@ -1,21 +1,47 @@
-"""The progress bar of filters."""
+"""The progress bar of the command and of filters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import pyvista_validation
+
+DOING = {
+    "read": "reading",
+    "segment": "finding materials",
+    "denoise": "removing noise",
+    "boundary": "extracting boundaries",
+    "smooth": "smoothing boundaries",
+    "mesh": "meshing",
+    "write": "writing",
+}
+
+
+@contextmanager
+def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """Give a function to call as each stage starts; it draws a bar if one is wanted and there is a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not (wanted and console.is_terminal):
+        yield lambda stage, number, total: None
+        return
+    columns = (TextColumn("{task.description:22}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("starting", total=None)
+
+        def show(stage: str, number: int, total: int) -> None:
+            progress.update(task, description=DOING[stage], completed=number, total=total)
+
+        yield show
+
 
 @contextmanager
 def progress_of(wanted: bool) -> Iterator[Callable[[str], None]]:
     """Give a function to call with the name of each stage that starts."""
-    from imgquad_mesh.checks import checked
-
-    if not checked(progress_bar=wanted)["progress_bar"]:
-        yield lambda stage: None
-        return
-    from imgquad_core.pipeline import STAGES
-    from imgquad_mesh.cli.console import progress_bar_if
-
-    with progress_bar_if(True) as show:
-        yield lambda stage: show(stage, STAGES.index(stage), len(STAGES))
+    pyvista_validation.check_instance(wanted, bool, name="progress_bar")
+    stages = list(DOING)
+    with progress_bar_if(wanted) as show:
+        yield lambda stage: show(stage, stages.index(stage), len(stages))

@@ -22,7 +22,6 @@ import defusedxml.ElementTree
 from imgquad_core.errors import InputError
 
 Value: TypeAlias = bool | int | float | str
-
 #: type in filters.xml -> type in a script; a bounded number (ABSPERC_GUI, SLIDER_GUI) has its own
 _SCRIPT_TYPES = {
     "Boolean": "RichBool",

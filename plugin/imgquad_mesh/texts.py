@@ -1,18 +1,18 @@
-"""Options that are not plain numbers, as the texts that scripts hold: the same texts as on the command line."""
+"""Options as texts, read and written: the same on the command line and in scripts."""
 
 from __future__ import annotations
 
 import argparse
 import csv
 import io
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
 
 from imgquad_core.errors import InputError
-from imgquad_mesh.cli import fe as elements
-from imgquad_mesh.cli import options as command
-from imgquad_mesh.spec import Filter, Value
+
+from .spec import Filter, Value
 
 T = TypeVar("T")
 
@@ -42,7 +42,7 @@ def _write_colors(value: Any) -> str:
 
 
 def _sizes(text: str) -> dict[str, float]:
-    return dict(command.size_of(item) for item in _items(text))
+    return dict(size_of(item) for item in _items(text))
 
 
 def _write_sizes(sizes: Mapping[Any, float] | None) -> str:
@@ -50,7 +50,7 @@ def _write_sizes(sizes: Mapping[Any, float] | None) -> str:
 
 
 def _cohesive(text: str) -> str | tuple[tuple[str, str], ...] | None:
-    read = [elements.pair(item) for item in _items(text)]
+    read = [pair(item) for item in _items(text)]
     pairs = tuple(pair for pair in read if not isinstance(pair, str))
     return "all" if "all" in read else pairs or None
 
@@ -59,22 +59,84 @@ def _write_cohesive(pairs: Any) -> str:
     return pairs if isinstance(pairs, str) else _joined(f"{a}:{b}" for a, b in pairs or ())
 
 
-_LENGTH_OR_AUTO = Text(
-    lambda text: None if text == "auto" else command.number(text), lambda v: "auto" if v is None else repr(v)
-)
+def colors(text: str) -> str | int | list[tuple[int, int, int]]:
+    """Return what --colors asks for."""
+    if text in ("auto", "exact"):
+        return text
+    if text.isdigit():
+        return int(text)
+    parts = [part.strip() for part in text.split(",")]
+    if not all(re.fullmatch("#[0-9a-fA-F]{6}", part) for part in parts):
+        raise argparse.ArgumentTypeError(f"'{text}' is none of: auto, exact, a number, '#rrggbb,#rrggbb,...'")
+    return [(int(p[1:3], 16), int(p[3:5], 16), int(p[5:7], 16)) for p in parts]
 
+
+def box(text: str) -> tuple[int, int, int, int]:
+    """Return what --crop asks for."""
+    if not re.fullmatch(r"-?\d+(,-?\d+){3}", text):
+        raise argparse.ArgumentTypeError(f"'{text}' is not X0,Y0,X1,Y1 in whole pixels")
+    left, upper, right, lower = map(int, text.split(","))
+    return left, upper, right, lower
+
+
+def size_of(text: str) -> tuple[str, float]:
+    """Return what --size-of asks for."""
+    material, _, size = text.rpartition("=")
+    if not material:
+        raise argparse.ArgumentTypeError(f"'{text}' is not MATERIAL=S, as in quartz=2")
+    return material, number(size)
+
+
+def whole_or_auto(text: str) -> int | str:
+    """Return 'auto' or a whole number."""
+    return text if text == "auto" else whole(text)
+
+
+def real_or_auto(text: str) -> float | str:
+    """Return 'auto' or a number."""
+    return text if text == "auto" else number(text)
+
+
+def whole(text: str) -> int:
+    """Return a whole number, 0 or more."""
+    if not text.isdigit():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number")
+    return int(text)
+
+
+def number(text: str) -> float:
+    """Return a number."""
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from None
+
+
+def pair(text: str) -> str | tuple[str, str]:
+    """Return what --cohesive asks for."""
+    if text == "all":
+        return text
+    a, colon, b = text.partition(":")
+    if not (a and colon and b):
+        raise argparse.ArgumentTypeError(f"'{text}' is neither all nor A:B, as in quartz:feldspar")
+    return a, b
+
+
+_LENGTH_OR_AUTO = Text(
+    lambda text: None if text == "auto" else number(text), lambda v: "auto" if v is None else repr(v)
+)
 #: by name of the field
 TEXTS: Mapping[str, Text] = {
-    "colors": Text(command.colors, _write_colors),
-    "min_pixels": Text(command.whole_or_auto, str),
-    "min_length": Text(command.real_or_auto, lambda v: v if isinstance(v, str) else repr(v)),
+    "colors": Text(colors, _write_colors),
+    "min_pixels": Text(whole_or_auto, str),
+    "min_length": Text(real_or_auto, lambda v: v if isinstance(v, str) else repr(v)),
     "boundary_size": _LENGTH_OR_AUTO,
     "material_sizes": Text(_sizes, _write_sizes),
     "drop": Text(lambda text: tuple(_items(text)), lambda names: _joined(map(str, names))),
-    "frame": Text(lambda text: command.whole(text) if text else None, lambda v: "" if v is None else str(v)),
+    "frame": Text(lambda text: whole(text) if text else None, lambda v: "" if v is None else str(v)),
     "cohesive": Text(_cohesive, _write_cohesive),
-    "extrude": Text(lambda text: command.number(text) if text else None, lambda v: "" if v is None else repr(v)),
-    "crop": Text(lambda text: command.box(text) if text else None, lambda box: ",".join(map(str, box)) if box else ""),
+    "extrude": Text(lambda text: number(text) if text else None, lambda v: "" if v is None else repr(v)),
+    "crop": Text(lambda text: box(text) if text else None, lambda box: ",".join(map(str, box)) if box else ""),
 }
 
 

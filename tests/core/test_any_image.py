@@ -9,10 +9,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from imgquad_core.boundary import extract_boundaries
-from imgquad_core.meshing import EFFORTS, MeshingOptions, mesh_boundaries
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
+from imgquad_core.mesher.efforts import EFFORTS, MeshingOptions
+from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import VOID, LabelImage, QuadMesh
-from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
 from invariants import assert_valid_mesh
 from shapes import KINDS, Labels, label_image, labels_of_kind, spiral, voronoi
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from faces import areas, assert_valid_faces, quads_of, voronoi_graph
-from imgquad_core import batches
-from imgquad_core.batches import faces_only, in_batches, joined
-from imgquad_core.splitting import FaceQuads
-from imgquad_core.topology import CleanUp, clean_up
+from imgquad_core.cleanup import batches
+from imgquad_core.cleanup.batches import in_batches
+from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
+from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from imgquad_core.boundary import POLICIES, ExtractionOptions, extract_boundaries
+from imgquad_core.boundary.areas import enclosed_areas
+from imgquad_core.boundary.extraction import POLICIES, ExtractionOptions, extract_boundaries
 from imgquad_core.errors import InputError
 from imgquad_core.model import BoundaryGraph, PointKind
-from imgquad_core.smoothing import region_areas
 from planar import check_planar
 from shapes import any_labels, label_image, spiral
 
@@ -31,7 +31,7 @@ def test_one_pixel_is_framed_by_four_chains_from_corner_to_corner() -> None:
     assert (graph.point_kind == PointKind.CORNER).sum() == 4
     corners = {tuple(xy) for xy in graph.points[graph.point_kind == PointKind.CORNER]}
     assert corners == {(0, 0), (1, 0), (0, 1), (1, 1)}
-    assert region_areas(graph).tolist() == [1.0]
+    assert enclosed_areas(graph).tolist() == [1.0]
 
 
 def test_a_junction_lies_where_three_colours_meet() -> None:
@@ -99,7 +99,7 @@ def test_void_pixels_are_outside() -> None:
     labels[0, 0] = -1
     graph = extract_boundaries(label_image(labels))
     assert graph.region_label.tolist() == [0]
-    assert region_areas(graph)[0] == pytest.approx(36 - 5 + 0.5 + 0.125, abs=1e-12)
+    assert enclosed_areas(graph)[0] == pytest.approx(36 - 5 + 0.5 + 0.125, abs=1e-12)
     assert (0.0, 6.0) not in {tuple(xy) for xy in graph.points}
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from handmade import disk, jiggle, round_inclusion, staircase
-from imgquad_core.cohesive import open_interfaces, split_interfaces
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh
-from imgquad_core.second_order import second_order
-from imgquad_core.sets import fe_mesh
+from imgquad_core.fe.cohesive import open_interfaces, split_interfaces
+from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.fe.second_order import second_order
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 
 NAMES = ("air", "clay", "iron")

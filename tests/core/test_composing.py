@@ -7,12 +7,13 @@ import pytest
 
 import naive
 from faces import Ids, Points, areas, cut_of, graph_of, grid, polygon_graph, quads_of, voronoi_graph, with_layers
-from imgquad_core.composing import WIDE_CORNER, WORST_PAIR, compose
-from imgquad_core.crossfield import CrossField, cross_field
-from imgquad_core.cutting import CutMesh, FaceConflict, cut_at_constraints
-from imgquad_core.frontal import EXCLUSION, frontal_points, spokes_of_rim, wanted_quads
+from imgquad_core.cleanup.faces import wanted_quads
+from imgquad_core.mesher.composing import WIDE_CORNER, WORST_PAIR, compose
+from imgquad_core.mesher.crossfield import CrossField, cross_field
+from imgquad_core.mesher.cutting import CutMesh, FaceConflict, cut_at_constraints
+from imgquad_core.mesher.frontal import EXCLUSION, frontal_points, spokes_of_rim
+from imgquad_core.mesher.triangulation import Triangles, constraint_table, triangulate
 from imgquad_core.model import VOID, BoundaryGraph
-from imgquad_core.triangulation import Triangles, constraint_table, triangulate
 
 SQUARE = np.array([[0.0, 0], [32, 0], [32, 32], [0, 32]])
 

@@ -9,10 +9,10 @@ import pytest
 
 import naive
 from faces import Ids, Points, areas, cut_of, graph_of, polygon_graph, voronoi_graph
-from imgquad_core.cutting import CutMesh, FaceConflict, cut_at_constraints
+from imgquad_core.mesher.cutting import CutMesh, FaceConflict, cut_at_constraints
+from imgquad_core.mesher.outline import outline
+from imgquad_core.mesher.triangulation import constraint_table, triangulate
 from imgquad_core.model import VOID, BoundaryGraph
-from imgquad_core.outline import outline
-from imgquad_core.triangulation import constraint_table, triangulate
 
 
 def two_squares(left: int = 0, right: int = 1) -> CutMesh | FaceConflict:

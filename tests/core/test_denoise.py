@@ -12,9 +12,9 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 from scipy.ndimage import label as connected
 
-from imgquad_core.denoise import DenoiseOptions, automatic_limits, list_removed, remove_noise
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, LabelImage, Materials
+from imgquad_core.picture.noise import DenoiseOptions, automatic_limits, list_removed, remove_noise
 
 Labels = NDArray[np.int32]
 

@@ -9,11 +9,11 @@ import pytest
 
 from ccx import needs_ccx, solve
 from handmade import disk, jiggle, staircase
-from imgquad_core.cohesive import split_interfaces
 from imgquad_core.errors import InputError
-from imgquad_core.extrusion import extrude
-from imgquad_core.second_order import second_order
-from imgquad_core.sets import fe_mesh
+from imgquad_core.fe.cohesive import split_interfaces
+from imgquad_core.fe.extrusion import extrude
+from imgquad_core.fe.second_order import second_order
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 
 FLAT = fe_mesh(staircase(disk(8, 2.6), ("matrix", "disk"), jiggle))

@@ -12,7 +12,8 @@ from scipy.sparse.csgraph import connected_components
 
 import naive
 from faces import grid
-from imgquad_core.halfedge import components, corners_at, twins_of
+from imgquad_core.geometry.halfedge import components, twins_of
+from imgquad_core.grouping import grouped
 
 Ids = NDArray[np.int64]
 
@@ -28,7 +29,7 @@ def polygons(draw: st.DrawFn) -> Ids:
 @settings(max_examples=60, derandomize=True, deadline=None)
 @given(polygons())
 def test_corners_of_each_point_come_ascending(faces: Ids) -> None:
-    offsets, corners = corners_at(faces, 9)
+    offsets, corners = grouped(faces, 9)
     assert len(offsets) == 10
     for v in range(9):
         assert np.array_equal(corners[offsets[v] : offsets[v + 1]], np.flatnonzero(faces.ravel() == v))
@@ -66,6 +67,6 @@ def test_grid_has_one_rim_and_mutual_twins() -> None:
 @pytest.mark.parametrize("n", [3, 4])
 def test_no_faces_have_no_corners(n: int) -> None:
     faces = np.empty((0, n), np.int64)
-    offsets, corners = corners_at(faces, 3)
+    offsets, corners = grouped(faces, 3)
     assert offsets.tolist() == [0, 0, 0, 0]
     assert corners.size == twins_of(faces, 3).size == 0

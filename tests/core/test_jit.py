@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imgquad_core import aside
+from imgquad_core import ahead
 from imgquad_core.jit import inlined, kernel, verb
 
 
@@ -61,11 +61,13 @@ def test_nothing_is_on_disk_at_the_first_start(tmp_path: Path) -> None:
     assert float(done.stdout) == 0.0
 
 
-ASIDE = """
-from imgquad_core import aside, mesh_image, MeshOptions, relaxation, repair, sliding, splitting, topology
+AHEAD = """
+from imgquad_core import ahead, mesh_image, MeshOptions
+from imgquad_core.cleanup import irregular_nodes, relaxation, sliding, worst_quads
+from imgquad_core.mesher import splitting, warm_up
 import numpy as np
-aside.compile_last_stages()
-modules = (relaxation, repair, sliding, splitting, topology)
+warm_up.compile_last_stages()
+modules = (relaxation, worst_quads, sliding, splitting, irregular_nodes)
 kernels = [k for m in modules for k in vars(m).values() if hasattr(k, "signatures")]
 before = {id(k): len(k.signatures) for k in kernels}
 labels = np.zeros((40, 60), np.int32)
@@ -75,12 +77,12 @@ print(sorted(k.__name__ for k in kernels if before[id(k)] and len(k.signatures) 
 names = ("_clean_pass", "_repair_pass", "newton", "slide")
 print(sorted(k.__name__ for k in kernels if before[id(k)] and k.__name__ in names))
 from imgquad_core.jit import share_on_disk
-print(share_on_disk() > aside.FIRST_START)
+print(share_on_disk() > ahead.FIRST_START)
 """
 
 
 def test_the_second_process_compiles_what_the_first_one_calls() -> None:
-    done = subprocess.run([sys.executable, "-c", ASIDE], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", AHEAD], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == ["[]", "['_clean_pass', '_repair_pass', 'newton', 'slide']", "True"]
 
 
@@ -88,17 +90,17 @@ def test_the_second_process_is_of_this_package_in_any_folder(tmp_path: Path, mon
     clone = tmp_path / "imgquad_core"  # as in a clone of the repository, while another copy is installed
     clone.mkdir()
     (clone / "__init__.py").touch()
-    (clone / "aside.py").write_text("raise SystemExit(3)", encoding="utf-8")
+    (clone / "ahead.py").write_text("raise SystemExit(3)", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(aside, "share_on_disk", lambda: 0.0)
+    monkeypatch.setattr(ahead, "share_on_disk", lambda: 0.0)
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
-    process = aside.start.__wrapped__()
+    process = ahead.start.__wrapped__()
     assert process is not None
-    assert process.wait(aside.LONGEST) == 0
+    assert process.wait(ahead.LONGEST) == 0
 
 
 def test_arrays_that_may_be_read_only_compile_no_kernel_again() -> None:
-    from imgquad_core.relaxation import rings_of
+    from imgquad_core.cleanup.relaxation import rings_of
 
     quads = np.array([[0, 1, 2, 3]])
     quads.flags.writeable = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -10,13 +11,15 @@ import pytest
 
 import naive
 from faces import Points, graph_of, polygon_graph, voronoi_graph
-from imgquad_core import batches, meshing
-from imgquad_core.boundary import extract_boundaries
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
+from imgquad_core.cleanup import batches
 from imgquad_core.errors import InputError, TopologyError
-from imgquad_core.meshing import EFFORTS, MeshingOptions, mesh_boundaries
+from imgquad_core.measures.quality import quality_report
+from imgquad_core.mesher import levels, meshing, refits
+from imgquad_core.mesher.efforts import EFFORTS, MeshingOptions, Tuning
+from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind, QuadMesh
-from imgquad_core.quality import quality_report
-from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
 from invariants import assert_valid_mesh
 from shapes import Labels, disc, label_image, voronoi
 
@@ -94,28 +97,25 @@ def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None
     graph = boundaries(label_image(np.random.default_rng(1).integers(0, 3, (40, 40))), size)
     mesh = mesh_boundaries(graph, MeshingOptions(size=size, effort="fast"))
     assert mesh.points[: len(graph.points)].tobytes() == graph.points.tobytes()
-    assert naive.worst_quality(mesh.points, mesh.quads) > meshing.WORST
+    assert naive.worst_quality(mesh.points, mesh.quads) > Tuning().worst
 
 
-@pytest.mark.parametrize("refits", [1, meshing.REFITS])
-def test_edges_are_halved_beside_points_that_fold_quads(refits: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("rounds", [1, Tuning().rounds])
+def test_edges_are_halved_beside_points_that_fold_quads(rounds: int) -> None:
     image = label_image(np.random.default_rng(5).integers(0, 3, (40, 40)))
     graph = boundaries(image, 5.0)
-    worst = meshing.WORST
-    monkeypatch.setattr(meshing, "WORST", 0.0)
-    as_it_was = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"))
-    monkeypatch.setattr(meshing, "WORST", 0.5)  # so that something is worse
-    monkeypatch.setattr(meshing, "REFITS", refits)
-    monkeypatch.setattr(meshing, "WISHES", min(meshing.WISHES, refits))
-    mesh = mesh_boundaries(graph, MeshingOptions(size=5.0, effort="fast"), image.materials)
+    usual, options = Tuning(), MeshingOptions(size=5.0, effort="fast")
+    as_it_was = mesh_boundaries(graph, replace(options, tuning=usual._replace(worst=0.0)))
+    pickier = usual._replace(worst=0.5, rounds=rounds, wishes=min(usual.wishes, rounds))  # so that something is worse
+    mesh = mesh_boundaries(graph, replace(options, tuning=pickier), image.materials)
     assert_valid_mesh(mesh, image)
     before, after = (naive.worst_quality(m.points, m.quads) for m in (as_it_was, mesh))
-    assert before < worst < after
+    assert before < usual.worst < after
     n, edges, finer = len(graph.points), np.diff(graph.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
     assert mesh.points[:n].tobytes() == graph.points.tobytes()
     assert (finer > edges).any()
     assert (finer % 2 == 0).all()
-    if refits == 1:
+    if rounds == 1:
         assert (finer == 2 * edges).all()
 
 
@@ -123,11 +123,11 @@ def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypa
     y, x = np.mgrid[:60, :70]
     image = label_image(((x + 4 * np.sin(y / 5)) // 10).astype(np.int32))  # wavy stripes
     graph = boundaries(image, 4.0)
-    mesh_faces = meshing._mesh_faces
+    mesh_faces = levels.mesh_faces
     first, last = int(graph.region_label.argmin()), int(graph.region_label.argmax())
     rounds: list[set[int]] = []
 
-    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions) -> meshing._Meshed:
+    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions) -> levels.Meshed:
         done = mesh_faces(graph, todo, options)
         worst = np.full(len(todo), 0.95)
         worst[first], worst[last] = (0.95, 0.2) if rounds else (0.3, 0.3)
@@ -135,11 +135,12 @@ def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypa
         return done._replace(worst=worst)
 
     as_it_was = mesh_boundaries(graph, MeshingOptions(size=4.0, effort="fast"))
-    monkeypatch.setattr(meshing, "WORST", 0.9)
-    monkeypatch.setattr(meshing, "_mesh_faces", pretended)
-    mesh = mesh_boundaries(graph, MeshingOptions(size=4.0, effort="fast"), image.materials)
+    monkeypatch.setattr(meshing, "mesh_faces", pretended)
+    monkeypatch.setattr(refits, "mesh_faces", pretended)
+    options = MeshingOptions(size=4.0, effort="fast", tuning=Tuning(worst=0.9))
+    mesh = mesh_boundaries(graph, options, image.materials)
     assert_valid_mesh(mesh, image)
-    assert len(rounds) == meshing.WISHES + 1
+    assert len(rounds) == Tuning().wishes + 1
     assert {first, last} <= rounds[1]
     assert all(last in todo and first not in todo for todo in rounds[2:])
     edges, finer = np.diff(as_it_was.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
@@ -157,9 +158,8 @@ def test_a_wish_that_fails_leaves_the_valid_mesh(monkeypatch: pytest.MonkeyPatch
     def failing(*_: object) -> None:
         raise TopologyError("no finer boundary")
 
-    monkeypatch.setattr(meshing, "WORST", 0.9)
-    monkeypatch.setattr(meshing, "_refitted", failing)
-    mesh = mesh_boundaries(graph, options, image.materials)
+    monkeypatch.setattr(refits, "_refitted", failing)
+    mesh = mesh_boundaries(graph, replace(options, tuning=Tuning(worst=0.9)), image.materials)
     assert mesh.points.tobytes() == as_it_was.points.tobytes()
     assert_valid_mesh(mesh, image)
 
@@ -170,21 +170,20 @@ def test_every_face_has_quads_however_bad_they_are(monkeypatch: pytest.MonkeyPat
 
     graph = voronoi_graph(64, 3, 2.0, 0)
     everything = np.ones(len(graph.region_label), bool)
-    monkeypatch.setattr(meshing, "lower_to_worst", worst_there_is)
+    monkeypatch.setattr(levels, "lower_to_worst", worst_there_is)
     for effort in EFFORTS:
-        done = meshing._mesh_faces(graph, everything, MeshingOptions(size=2.0, effort=effort))
+        done = levels.mesh_faces(graph, everything, MeshingOptions(size=2.0, effort=effort))
         faces = np.concatenate([np.unique(part.face) for part in done.parts])
         assert sorted(faces.tolist()) == list(range(len(everything)))
 
 
-def test_very_wide_faces_are_split_in_nine_with_the_most_effort(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_very_wide_faces_are_split_in_nine_with_the_most_effort() -> None:
     image = label_image(disc(50, (110, 110), 220))
     graph = boundaries(image, 2.0, in_twelves=True)
     options = MeshingOptions(size=2.0, effort="best")
     nine = mesh_boundaries(graph, options, image.materials)
     assert_valid_mesh(nine, image)
-    monkeypatch.setattr(meshing, "VERY_WIDE", np.inf)
-    four = mesh_boundaries(graph, options, image.materials)
+    four = mesh_boundaries(graph, replace(options, tuning=Tuning(very_wide=np.inf)), image.materials)
     ours, theirs = quality_report(nine), quality_report(four)
     assert ours.irregular < 0.8 * theirs.irregular
     assert ours.mean_sj > theirs.mean_sj - 0.003

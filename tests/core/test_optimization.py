@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from handmade import disk, jiggle, round_inclusion, staircase
+from imgquad_core.cleanup.optimization import OptimizationOptions, optimize
 from imgquad_core.errors import InputError
+from imgquad_core.measures.quality import material_areas, quality_report
 from imgquad_core.model import LabelImage, Materials, PointKind, QuadMesh
-from imgquad_core.optimization import OptimizationOptions, optimize
-from imgquad_core.pipeline import MeshOptions, run
-from imgquad_core.quality import material_areas, quality_report
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import run
 from invariants import assert_valid_mesh
 
 LABELS = disk(48, 15)

@@ -9,18 +9,9 @@ import numpy as np
 import pytest
 
 from faces import graph_of, polygon_graph, voronoi_graph
+from imgquad_core.chains import halved, refined, with_chains_of, without_unused_points
+from imgquad_core.mesher.outline import chains_of, coarse_segments, outline, wide_faces, with_short_chains_halved
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
-from imgquad_core.outline import (
-    chains_of,
-    coarse_segments,
-    halved,
-    outline,
-    refined,
-    wide_faces,
-    with_chains_of,
-    with_short_chains_halved,
-    without_unused_points,
-)
 
 SQUARE = [[0, 0], [32, 0], [32, 32], [0, 32]]
 

@@ -9,7 +9,7 @@ import pytest
 
 import naive
 from faces import Ids, Points, areas
-from imgquad_core.patterns import (
+from imgquad_core.cleanup.patterns import (
     Canvas,
     choose_cut,
     cut_quads,

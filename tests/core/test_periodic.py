@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 
 from ccx import needs_ccx, solve
 from handmade import staircase
-from imgquad_core.cohesive import split_interfaces
+from imgquad_core.boundary.areas import enclosed_areas
 from imgquad_core.errors import InputError, TopologyError
-from imgquad_core.extrusion import extrude
+from imgquad_core.fe.cohesive import split_interfaces
+from imgquad_core.fe.extrusion import extrude
+from imgquad_core.fe.periodic_pairs import with_periodic_pairs
+from imgquad_core.fe.second_order import second_order
+from imgquad_core.fe.sets import fe_mesh
+from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.model import VOID
-from imgquad_core.pairing import with_periodic_pairs
-from imgquad_core.pipeline import MeshOptions, mesh_image, run
-from imgquad_core.quality import scaled_jacobian
-from imgquad_core.second_order import second_order
-from imgquad_core.sets import fe_mesh
-from imgquad_core.smoothing import region_areas
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import mesh_image, run
 from imgquad_core.writers import write_mesh
 
 
@@ -55,7 +56,7 @@ def test_sides_match_and_areas_stay(seed: int, directions: str) -> None:
         assert (step[:, 1 - axis] == 0).all()
     assert scaled_jacobian(mesh.points, mesh.quads).min() > 0.05
     pixels = np.bincount(labels.ravel())
-    of_boundary = np.bincount(made.boundary.region_label, region_areas(made.boundary))
+    of_boundary = np.bincount(made.boundary.region_label, enclosed_areas(made.boundary))
     assert np.abs(of_boundary / pixels - 1).max() < 2e-4
     assert np.abs(areas(mesh) / pixels - 1).max() < 1e-3  # the mesher may give up single points of boundaries
 

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 
 from faces import areas, assert_valid_faces, grid, polygon_graph, quads_of, valences
-from imgquad_core import batches, pieces
-from imgquad_core.boundary import extract_boundaries
-from imgquad_core.meshing import MeshingOptions, mesh_boundaries
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
+from imgquad_core.cleanup import batches, strips
+from imgquad_core.cleanup.faces import INNER_VALENCE, FaceQuads
+from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
+from imgquad_core.cleanup.strips import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
+from imgquad_core.measures.quality import quality_report
+from imgquad_core.mesher.efforts import MeshingOptions
+from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import LabelImage
-from imgquad_core.pieces import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
-from imgquad_core.quality import quality_report
-from imgquad_core.smoothing import SmoothingOptions, smooth_boundaries
-from imgquad_core.splitting import INNER_VALENCE, FaceQuads
-from imgquad_core.topology import CleanUp, clean_up
 from invariants import assert_valid_mesh
 from shapes import label_image, labels_of_kind, pixel_centres
 
@@ -27,7 +28,7 @@ Ids = np.ndarray[tuple[int], np.dtype[np.int64]]
 @pytest.fixture
 def face(monkeypatch: pytest.MonkeyPatch) -> FaceQuads:
     """Return a hexagon of unstructured quads, wide enough for some strips of eight quads."""
-    monkeypatch.setattr(pieces, "WIDTH", 8)
+    monkeypatch.setattr(strips, "WIDTH", 8)
     corners = [(60 + 58 * np.cos(a), 60 + 58 * np.sin(a)) for a in np.arange(6) * np.pi / 3]
     return quads_of(polygon_graph(corners, [24] * 6, (120, 120)), 2.4)
 
@@ -183,7 +184,7 @@ def test_a_matrix_in_pieces_has_no_scar(matrix: LabelImage, monkeypatch: pytest.
 @pytest.mark.parametrize("kind", ["noise", "checkerboard", "speckled", "void"])
 def test_narrow_strips_leave_any_picture_valid(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(batches, "LARGEST", 30)
-    monkeypatch.setattr(pieces, "WIDTH", 4)
+    monkeypatch.setattr(strips, "WIDTH", 4)
     image = label_image(labels_of_kind(kind, 24, 28, 3, 7))
     graph = smooth_boundaries(extract_boundaries(image), SmoothingOptions(size=1.0))
     assert_valid_mesh(mesh_boundaries(graph, MeshingOptions(size=1.0), image.materials), image)

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 import imgquad_core
 from imgquad_core.errors import InputError, QualityError
 from imgquad_core.ledger import material_ledger, region_errors
+from imgquad_core.measures.quality import quality_report, require_quality
 from imgquad_core.model import VOID, LabelImage, Materials
-from imgquad_core.pipeline import STAGES, MeshOptions, mesh_image, run, thin_features
-from imgquad_core.quality import quality_report, require_quality
-from imgquad_core.selection import crop_image, drop_materials, material_number
+from imgquad_core.options import MeshOptions
+from imgquad_core.picture.selection import crop_image, drop_materials, material_number
+from imgquad_core.pipeline import STAGES, mesh_image, run, thin_features
 from invariants import assert_valid_mesh
 from shapes import wedge
 

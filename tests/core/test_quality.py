@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imgquad_core import quality
+from imgquad_core.measures import quality
 from imgquad_core.model import Materials, PointKind, QuadMesh
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -9,25 +9,22 @@ import pytest
 
 import naive
 from faces import Points, grid, quads_of, voronoi_graph
-from imgquad_core.quality import scaled_jacobian
-from imgquad_core.relaxation import (
+from imgquad_core.arrays import Flags
+from imgquad_core.cleanup.faces import FaceQuads
+from imgquad_core.cleanup.relaxation import (
     BAD,
     GOOD,
-    Flags,
     Rings,
     _corner_energy,
     fit_rim,
     laplace,
-    lower_to_worst,
     newton,
-    quad_area,
-    quad_quality,
     ring_quality,
     rings_of,
-    sector_angles,
     untangle,
 )
-from imgquad_core.splitting import FaceQuads
+from imgquad_core.geometry.quad_shape import lower_to_worst, quad_area, quad_quality, sector_angles
+from imgquad_core.measures.quality import scaled_jacobian
 
 Move = Callable[[Points, Rings, Flags], object]
 MOVES: dict[str, Move] = {

@@ -7,9 +7,9 @@ import pytest
 
 import naive
 from faces import Ids, Points, areas, assert_valid_faces, grid, quads_of, rim_edges, voronoi_graph
-from imgquad_core.relaxation import laplace, rings_of
-from imgquad_core.repair import LEAST_GAIN, repair
-from imgquad_core.splitting import FaceQuads
+from imgquad_core.cleanup.faces import FaceQuads
+from imgquad_core.cleanup.relaxation import laplace, rings_of
+from imgquad_core.cleanup.worst_quads import LEAST_GAIN, repair
 
 
 def rough_polygon(n: int, seed: int) -> Points:

@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from handmade import disk, jiggle, staircase
-from imgquad_core.sampling import area_means
+from imgquad_core.measures.sampling import area_means
 
 PICTURE = np.random.default_rng(2).random((9, 13, 2)) * 255
 

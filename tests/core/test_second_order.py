@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from handmade import disk, jiggle, round_inclusion, staircase
+from imgquad_core.arrays import Floats
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import FEMesh, Floats
-from imgquad_core.second_order import second_order, serendipity_slopes
-from imgquad_core.sets import fe_mesh
+from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.fe.second_order import second_order, serendipity_slopes
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 
 GAUSS = np.sqrt(0.6) * np.array([-1, 0, 1])

@@ -7,9 +7,9 @@ import pytest
 
 from handmade import disk, jiggle, staircase
 from imgquad_core.errors import InputError
-from imgquad_core.femesh import KINDS, FEMesh, Names
+from imgquad_core.fe.femesh import KINDS, FEMesh, Names
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import VOID
-from imgquad_core.sets import fe_mesh
 
 THREE = np.array([[0, 0, 1, 1], [0, 0, 1, 1], [2, 2, 2, 2]])
 

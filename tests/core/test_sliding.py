@@ -7,9 +7,9 @@ import pytest
 
 import naive
 from faces import Ids, Points, grid
+from imgquad_core.cleanup.relaxation import rings_of
+from imgquad_core.cleanup.sliding import REACH, slide
 from imgquad_core.model import PointKind
-from imgquad_core.relaxation import rings_of
-from imgquad_core.sliding import REACH, slide
 
 #: ids of the nodes on the line x = 3 of a 6 x 6 grid, from below
 LINE = np.arange(3, 49, 7)

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from imgquad_core import resolving
-from imgquad_core.areas import restore_areas
-from imgquad_core.boundary import POLICIES, ExtractionOptions, extract_boundaries
-from imgquad_core.curves import curves_of, per_point
+from imgquad_core.boundary import withdrawal
+from imgquad_core.boundary.areas import enclosed_areas, restore_areas
+from imgquad_core.boundary.curves import curves_of, per_point
+from imgquad_core.boundary.extraction import POLICIES, ExtractionOptions, extract_boundaries
+from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.errors import InputError
 from imgquad_core.model import BoundaryGraph, PointKind
-from imgquad_core.smoothing import SmoothingOptions, region_areas, smooth_boundaries
 from planar import check_meshable, check_planar
 from shapes import any_labels, disc, half_plane, label_image, spiral, square, voronoi, wedge
 
@@ -50,7 +50,7 @@ def test_any_picture_gives_planar_polylines(seed: int, size: float) -> None:
     labels = any_labels(seed)
     graph = smoothed(labels, size)
     check_meshable(graph)
-    assert (region_areas(graph) > 0).all()
+    assert (enclosed_areas(graph) > 0).all()
 
 
 @pytest.mark.parametrize("policy", POLICIES)
@@ -92,16 +92,16 @@ def test_a_window_with_two_samples_leaves_its_point() -> None:
 def test_hopeless_curves_fall_back_to_the_pixel_boundary(
     size: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(resolving, "_ROUNDS", rounds)
-    monkeypatch.setattr(resolving, "_GENTLE_ROUNDS", min(rounds, 8))
+    monkeypatch.setattr(withdrawal, "_ROUNDS", rounds)
+    monkeypatch.setattr(withdrawal, "_GENTLE_ROUNDS", min(rounds, 8))
     raw = extract_boundaries(label_image(np.random.default_rng(8).integers(0, 3, (14, 14))))
     curves, ends = curves_of(raw)
     wild = curves.raw + np.random.default_rng(1).normal(0.0, 2.0, curves.raw.shape)
     wild = np.clip(wild, 0.0, 14.0)
     wild[per_point(curves, curves.is_frame)] = curves.raw[per_point(curves, curves.is_frame)]
     limit, nowhere = np.full(len(wild), size), np.zeros(len(wild), bool)
-    draft = resolving.Draft(curves, ends, wild, ends.place, nowhere, limit, 1.2, False, raw.shape)
-    nodes, _ = resolving.place_freely(draft, limit)
+    draft = withdrawal.Draft(curves, ends, wild, ends.place, nowhere, limit, 1.2, False, raw.shape)
+    nodes, _ = withdrawal.place_freely(draft, limit)
     graph = replace(
         raw,
         points=nodes.points,
@@ -209,7 +209,7 @@ def test_a_corner_near_an_end_keeps_no_face_from_the_coarse_level() -> None:
 def test_regions_of_fifty_pixels_keep_their_areas(size: float) -> None:
     graph = smoothed(voronoi(200, 200, 60, 5), size)
     large = graph.region_pixels >= 50
-    error = np.abs(region_areas(graph) - graph.region_pixels) / graph.region_pixels
+    error = np.abs(enclosed_areas(graph) - graph.region_pixels) / graph.region_pixels
     assert large.sum() > 40
     assert error[large].max() < 1e-3
 

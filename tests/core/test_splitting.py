@@ -19,12 +19,13 @@ from faces import (
     voronoi_graph,
     with_layers,
 )
-from imgquad_core.composing import compose
-from imgquad_core.halfedge import twins_of
+from imgquad_core.cleanup.faces import FaceQuads
+from imgquad_core.geometry.halfedge import twins_of
+from imgquad_core.mesher.composing import compose
+from imgquad_core.mesher.outline import coarse_segments
+from imgquad_core.mesher.splitting import points_between, split_composed, split_quads
+from imgquad_core.mesher.triangulation import constraint_table
 from imgquad_core.model import BoundaryGraph
-from imgquad_core.outline import coarse_segments
-from imgquad_core.splitting import FaceQuads, points_between, split_composed, split_quads
-from imgquad_core.triangulation import constraint_table
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -17,9 +17,10 @@ from faces import (
     voronoi_graph,
     with_layers,
 )
-from imgquad_core.relaxation import laplace, rings_of
-from imgquad_core.splitting import FaceQuads, split_composed
-from imgquad_core.topology import CleanUp, clean_up
+from imgquad_core.cleanup.faces import FaceQuads
+from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
+from imgquad_core.cleanup.relaxation import laplace, rings_of
+from imgquad_core.mesher.splitting import split_composed
 
 NORMAL = CleanUp((16, 40, 80), 0.2, 0.6)
 

@@ -9,8 +9,8 @@ import pytest
 
 from handmade import disk, jiggle, round_inclusion, staircase
 from imgquad_core.errors import InputError
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import VOID, PointKind, QuadMesh
-from imgquad_core.sets import fe_mesh
 from imgquad_core.tracing import trace_mesh
 
 PICTURE = disk(12, 4)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import naive
 from faces import areas, polygon_graph, voronoi_graph
 from imgquad_core.errors import TopologyError
-from imgquad_core.triangulation import Triangles, constraint_table, triangulate
+from imgquad_core.mesher.triangulation import Triangles, constraint_table, triangulate
 
 SQUARE = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4]])
 AROUND = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])

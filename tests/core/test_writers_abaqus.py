@@ -10,7 +10,7 @@ import pytest
 
 from handmade import disk, jiggle, staircase
 from imgquad_core.errors import InputError
-from imgquad_core.sets import fe_mesh
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 
 MESH = staircase(disk(8, 3), ("matrix", "Ein Kreis!"), jiggle)

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from handmade import disk, jiggle_beside, staircase
-from imgquad_core.cohesive import split_interfaces
 from imgquad_core.errors import InputError
-from imgquad_core.extrusion import extrude
-from imgquad_core.second_order import second_order
-from imgquad_core.sets import fe_mesh
+from imgquad_core.fe.cohesive import split_interfaces
+from imgquad_core.fe.extrusion import extrude
+from imgquad_core.fe.second_order import second_order
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 
 LAYERS = staircase(np.repeat([0, 1], 4)[None, :].repeat(6, axis=0), ("quartz", "feldspar"), jiggle_beside(0, 4))

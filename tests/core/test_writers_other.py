@@ -12,7 +12,7 @@ import pytest
 
 from handmade import disk, jiggle, staircase
 from imgquad_core.errors import InputError
-from imgquad_core.sets import fe_mesh
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import WRITERS, write_mesh, writer_for
 
 PICTURE = disk(10, 3.5)

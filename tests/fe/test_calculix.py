@@ -10,9 +10,9 @@ import pytest
 
 from ccx import needs_ccx, solve
 from handmade import disk, jiggle, jiggle_beside, round_inclusion, staircase
+from imgquad_core.fe.second_order import second_order
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import VOID
-from imgquad_core.second_order import second_order
-from imgquad_core.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 
 pytestmark = needs_ccx

@@ -10,11 +10,12 @@ import pytest
 
 from ccx import needs_ccx, solve
 from handmade import jiggle_beside, round_inclusion, staircase
-from imgquad_core.cohesive import split_interfaces
-from imgquad_core.femesh import FEMesh
-from imgquad_core.pipeline import MeshOptions, mesh_image
-from imgquad_core.second_order import second_order
-from imgquad_core.sets import fe_mesh
+from imgquad_core.fe.cohesive import split_interfaces
+from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.fe.second_order import second_order
+from imgquad_core.fe.sets import fe_mesh
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import mesh_image
 from imgquad_core.writers import write_mesh
 
 pytestmark = needs_ccx

@@ -10,10 +10,11 @@ import pytest
 
 from ccx import needs_ccx
 from handmade import disk, round_inclusion, staircase
+from imgquad_core.fe.second_order import second_order
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import QuadMesh
-from imgquad_core.pipeline import MeshOptions, mesh_image
-from imgquad_core.second_order import second_order
-from imgquad_core.sets import fe_mesh
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import mesh_image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 import fe_figures

@@ -8,7 +8,7 @@ import pyvista as pv
 from pyvista.core.errors import MissingDataError
 
 from imgquad_core.errors import InputError
-from imgquad_mesh.convert import image_array, image_placement
+from imgquad_mesh.datasets.images import image_array, image_placement
 
 PICTURE = np.arange(24).reshape(4, 6)  # 4 rows, 6 columns
 

@@ -11,11 +11,12 @@ import pytest
 
 from imgquad_core.errors import QualityError
 from imgquad_core.model import Materials, QuadMesh
-from imgquad_core.pipeline import MeshOptions, mesh_image
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import mesh_image
 from imgquad_core.tracing import trace_mesh
-from imgquad_mesh import crosscheck as module
-from imgquad_mesh.catalogue import MissingMeshLab, meshlab_filters
-from imgquad_mesh.crosscheck import Comparison, crosscheck, touching_points
+from imgquad_mesh.meshlab import crosscheck as module
+from imgquad_mesh.meshlab.catalogue import MissingMeshLab, meshlab_filters
+from imgquad_mesh.meshlab.crosscheck import Comparison, crosscheck, touching_points
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT.parent / "shared" / "images"

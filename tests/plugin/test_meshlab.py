@@ -13,20 +13,13 @@ import pyvista as pv
 
 from imgquad_core.errors import InputError
 from imgquad_core.model import Materials
-from imgquad_core.pipeline import MeshOptions, mesh_image
-from imgquad_mesh.catalogue import MissingMeshLab, meshlab_filters
-from imgquad_mesh.files import write_mesh_file
-from imgquad_mesh.layer import (
-    Layer,
-    face_of_triangle,
-    load_layer,
-    polyline,
-    save_layer,
-    surface,
-    write_ply,
-)
-from imgquad_mesh.meshlab import face_materials, quad_layer, quad_mesh
-from imgquad_mesh.runner import MeshLabError, MeshLabProcess
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import mesh_image
+from imgquad_mesh.meshlab.catalogue import MissingMeshLab, meshlab_filters
+from imgquad_mesh.meshlab.layer import Layer, face_of_triangle, load_layer, polyline, save_layer, surface, write_ply
+from imgquad_mesh.meshlab.meshsets import face_materials, quad_layer, quad_mesh
+from imgquad_mesh.meshlab.process import MeshLabError, MeshLabProcess
+from imgquad_mesh.outputs.files import write_mesh_file
 from imgquad_mesh.spec import filters
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -45,7 +38,8 @@ sys.path[:0] = [{root!r}, {plugin!r}]
 import numpy as np
 import pymeshlab
 import imgquad_mesh
-from imgquad_core.pipeline import MeshOptions, mesh_image
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import mesh_image
 LABELS = np.zeros((24, 30), np.int32)
 LABELS[6:18, 8:20] = 3
 LABELS[1:5, 1:6] = 5

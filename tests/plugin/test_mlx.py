@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from imgquad_core.errors import ScriptError
-from imgquad_mesh.mlx import Script, ScriptFilter, ScriptParameter, read_script, script_text
-from imgquad_mesh.names import meshlab_function, nearest
+from imgquad_mesh.meshlab.mlx import Script, ScriptFilter, ScriptParameter, read_script, script_text
+from imgquad_mesh.meshlab.names import meshlab_function, nearest
 from imgquad_mesh.spec import python_name
 
 EVERY_TYPE = ScriptFilter(

@@ -15,16 +15,17 @@ import pytest
 
 from bad_scripts import BAD_ELEMENTS, BAD_FILES, BAD_MESHLAB, FAILING, MESH, filter_xml
 from imgquad_core.errors import InputError, ScriptError
-from imgquad_core.pipeline import MeshOptions, mesh_image
-from imgquad_mesh import catalogue
-from imgquad_mesh.catalogue import MissingMeshLab, meshlab_filters, meshlab_parameters
-from imgquad_mesh.checking import MeshLabStep, checked_steps
-from imgquad_mesh.layer import Layer, write_ply
-from imgquad_mesh.mlx import Script, read_script, script_text
-from imgquad_mesh.names import meshlab_function
-from imgquad_mesh.script import run_script
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import mesh_image
+from imgquad_mesh.meshlab import catalogue
+from imgquad_mesh.meshlab.catalogue import MissingMeshLab, meshlab_filters, meshlab_parameters
+from imgquad_mesh.meshlab.checking import MeshLabStep, checked_steps
+from imgquad_mesh.meshlab.layer import Layer, write_ply
+from imgquad_mesh.meshlab.mlx import Script, read_script, script_text
+from imgquad_mesh.meshlab.names import meshlab_function
+from imgquad_mesh.meshlab.script import run_script
+from imgquad_mesh.meshlab.templates import filter_script, named_filters, run_as_script
 from imgquad_mesh.spec import filters, python_name
-from imgquad_mesh.templates import filter_script, named_filters, run_as_script
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT.parent / "shared" / "images"

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from imgquad_core.errors import InputError
+from imgquad_mesh.meshlab.steps import STEPS
 from imgquad_mesh.spec import Filter, filters, filters_file, find_filter, python_name, read_filters
-from imgquad_mesh.steps import STEPS
 from imgquad_mesh.texts import TEXTS, options_from, values_of
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,11 +12,10 @@ import pyvista as pv
 
 from handmade import disk, jiggle, round_inclusion, staircase
 from imgquad_core.errors import InputError
-from imgquad_core.sets import fe_mesh
+from imgquad_core.fe.elements import ElementOptions, make_elements
+from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
-from imgquad_mesh.convert import to_grid
-from imgquad_mesh.elements import ElementOptions, make_elements
-from imgquad_mesh.writers import from_grid, to_fe_grid
+from imgquad_mesh.datasets.grids import from_grid, to_fe_grid, to_grid
 
 MESH = staircase(disk(10, 3), ("matrix", "disk"), jiggle)
 

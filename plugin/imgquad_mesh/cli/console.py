@@ -1,41 +1,12 @@
-"""What the command shows: a progress bar on a terminal, the report as a short table."""
+"""What the command shows: the report as a short table."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
-
-DOING = {
-    "read": "reading",
-    "segment": "finding materials",
-    "denoise": "removing noise",
-    "boundary": "extracting boundaries",
-    "smooth": "smoothing boundaries",
-    "mesh": "meshing",
-    "write": "writing",
-}
-
-
-@contextmanager
-def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Give a function to call as each stage starts; it draws a bar if one is wanted and there is a terminal."""
-    console = Console(stderr=True)
-    if not (wanted and console.is_terminal):
-        yield lambda stage, number, total: None
-        return
-    columns = (TextColumn("{task.description:22}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("starting", total=None)
-
-        def show(stage: str, number: int, total: int) -> None:
-            progress.update(task, description=DOING[stage], completed=number, total=total)
-
-        yield show
 
 
 def announce_compiling() -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from imgquad_core.errors import InputError
-from imgquad_mesh.cli.run import Outputs, mesh_to_files
+
+from .run import Outputs, mesh_to_files
 
 
 def add_parser(subparsers: Any) -> None:
@@ -20,9 +21,10 @@ def add_parser(subparsers: Any) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the demo into `args.folder`; return the exit code."""
-    from imgquad_core.pipeline import MeshOptions
-    from imgquad_mesh.drawing import rock_picture
-    from imgquad_mesh.files import replace_file
+    from imgquad_core.options import MeshOptions
+    from imgquad_mesh.outputs.files import replace_file
+
+    from .rock_picture import rock_picture
 
     folder: Path = args.folder
     try:

@@ -10,13 +10,16 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from imgquad_core.errors import InputError
-from imgquad_mesh.cli.fe import add_element_options, element_options, writer_options
-from imgquad_mesh.cli.options import add_mesh_options, mesh_options, number
-from imgquad_mesh.cli.script import print_crosscheck
+from imgquad_mesh.texts import number
+
+from .element_options import add_element_options, element_options, writer_options
+from .mesh_options import add_mesh_options, mesh_options
+from .script import print_crosscheck
 
 if TYPE_CHECKING:
-    from imgquad_core.pipeline import MeshOptions, Run
-    from imgquad_mesh.elements import ElementOptions
+    from imgquad_core.fe.elements import ElementOptions
+    from imgquad_core.options import MeshOptions
+    from imgquad_core.pipeline import Run
 
 
 def add_parser(subparsers: Any) -> None:
@@ -51,7 +54,7 @@ class Outputs:
 
     def check(self) -> None:
         """Raise `InputError` if one of them could not be written, before any work is done."""
-        from imgquad_mesh.files import check_target, mesh_extensions
+        from imgquad_mesh.outputs.files import check_target, mesh_extensions
 
         allowed = {
             "mesh": mesh_extensions(),
@@ -111,11 +114,13 @@ def mesh_to_files(
         A quad is below `min_quality`, or with `crosscheck` another program measures other figures; all files are
         written.
     """
-    from imgquad_core.quality import require_quality
-    from imgquad_mesh.catalogue import meshlab_filters
-    from imgquad_mesh.cli.console import announce_compiling, print_report, progress_bar_if
-    from imgquad_mesh.files import write_json
-    from imgquad_mesh.report import build_report
+    from imgquad_core.measures.quality import require_quality
+    from imgquad_mesh.meshlab.catalogue import meshlab_filters
+    from imgquad_mesh.outputs.files import write_json
+    from imgquad_mesh.outputs.report import build_report
+    from imgquad_mesh.progress import progress_bar_if
+
+    from .console import announce_compiling, print_report
 
     start = perf_counter()
     outputs.check()
@@ -147,13 +152,13 @@ def _run(image: Path, options: MeshOptions, progress: Callable[[str, int, int], 
 
     if image.suffix.lower() != ".vti":
         return run(image, options, progress)
-    from imgquad_mesh.files import read_vti
+    from imgquad_mesh.outputs.files import read_vti
 
     return run(read_vti(image, options.max_pixels), options, progress)
 
 
 def _write(run: Run, outputs: Outputs, writing: Writing) -> None:
-    from imgquad_mesh import files
+    from imgquad_mesh.outputs import files
 
     if outputs.labels:
         files.write_labels(run.labels, outputs.labels)
@@ -162,5 +167,14 @@ def _write(run: Run, outputs: Outputs, writing: Writing) -> None:
     if outputs.picture:
         files.write_picture(run.mesh, outputs.picture)
     if outputs.script:
-        files.write_script(run.options, outputs.script)
+        _write_script(run.options, outputs.script)
     files.write_mesh_file(run.mesh, outputs.mesh, writing.elements, **writing.options)
+
+
+def _write_script(options: MeshOptions, path: Path) -> None:
+    """Write a filter script that makes the same mesh of the same picture."""
+    from imgquad_mesh.meshlab.templates import run_as_script
+    from imgquad_mesh.outputs.files import replace_file
+
+    text = run_as_script(options)
+    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))

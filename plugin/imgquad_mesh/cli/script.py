@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from imgquad_mesh.cli.options import number
+from imgquad_mesh.texts import number
 
 if TYPE_CHECKING:
     from imgquad_core.model import QuadMesh
-    from imgquad_mesh.script import ScriptResult
+    from imgquad_mesh.meshlab.script import ScriptResult
 
 #: endings of inputs that are meshes; all others are pictures
 MESHES = (
@@ -51,8 +51,8 @@ def add_parser(subparsers: Any) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Run the script that `args` names; return the exit code."""
-    from imgquad_mesh.files import check_target, write_json
-    from imgquad_mesh.script import run_script
+    from imgquad_mesh.meshlab.script import run_script
+    from imgquad_mesh.outputs.files import check_target, write_json
 
     if args.report:
         check_target(args.report, (".json",))
@@ -85,7 +85,7 @@ def report_of(result: ScriptResult) -> dict[str, Any]:
 
 def print_crosscheck(mesh: QuadMesh, quiet: bool) -> None:
     """Measure a mesh with MeshLab and PyVista, too; QualityError where their figures are others."""
-    from imgquad_mesh.crosscheck import crosscheck
+    from imgquad_mesh.meshlab.crosscheck import crosscheck
 
     found = crosscheck(mesh)
     if not quiet:

@@ -1,0 +1,188 @@
+"""The dense curves that smoothing works on: every chain with its own copy of its points, and the ends they share."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.arrays import Bytes, Flags, Floats, Ints
+from imgquad_core.jit import kernel, verb
+from imgquad_core.model import BoundaryGraph, PointKind
+
+_LONGEST_RUN = 16  # sides from step to step that count
+
+
+class Curves(NamedTuple):
+    """The pixel boundary, chain by chain.
+
+    Chain c has the dense points ``offsets[c]:offsets[c + 1]``; a closed one repeats its first point.
+    """
+
+    raw: Floats  #: (n, 2) points of the pixel boundary
+    arc: Floats  #: (n,) length along the chain up to each point
+    weight: Floats  #: (n,) how well each point is known, see `sample_weights`
+    offsets: Ints  #: (n_chains + 1,)
+    ends: Ints  #: (n_chains, 2) node at either end; -1 closed
+    is_frame: Flags  #: (n_chains,) lies on the picture's border
+
+
+class Ends(NamedTuple):
+    """The points that chains end at."""
+
+    place: Floats  #: (n_nodes, 2)
+    kind: Bytes  #: (n_nodes,) JUNCTION or CORNER
+    offsets: Ints  #: (n_nodes + 1,) CSR of `sockets`
+    sockets: Ints  #: 2 * chain + 0 for its start or 1 for its end
+
+
+def curves_of(graph: BoundaryGraph) -> tuple[Curves, Ends]:
+    """Unpack a pixel boundary."""
+    raw = graph.points[graph.chain_points]
+    first, last = graph.chain_points[graph.chain_offsets[:-1]], graph.chain_points[graph.chain_offsets[1:] - 1]
+    is_node = (graph.point_kind == PointKind.JUNCTION) | (graph.point_kind == PointKind.CORNER)
+    open_ = is_node[first]
+    nodes = np.unique(np.concatenate([first[open_], last[open_]]))
+    ends = np.full((graph.n_chains, 2), -1, np.int64)
+    ends[open_, 0], ends[open_, 1] = np.searchsorted(nodes, first[open_]), np.searchsorted(nodes, last[open_])
+    sockets = np.flatnonzero(ends.ravel() >= 0)
+    at = ends.ravel()[sockets]
+    second = graph.chain_points[graph.chain_offsets[:-1] + 1]
+    curves = Curves(
+        raw,
+        arc_lengths(raw, np.array(graph.chain_offsets)),
+        sample_weights(raw, np.array(graph.chain_offsets)),
+        np.array(graph.chain_offsets),
+        ends,
+        graph.point_kind[second] == PointKind.FRAME,
+    )
+    return curves, Ends(
+        graph.points[nodes],
+        graph.point_kind[nodes],
+        np.concatenate([[0], np.cumsum(np.bincount(at, minlength=len(nodes)))]).astype(np.int64),
+        sockets[np.argsort(at, kind="stable")],
+    )
+
+
+@kernel
+def arc_lengths(points: Floats, offsets: Ints) -> Floats:
+    """Length along each chain up to each of its points."""
+    arc = np.zeros(len(points))
+    for c in range(len(offsets) - 1):
+        for i in range(offsets[c] + 1, offsets[c + 1]):
+            arc[i] = arc[i - 1] + np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
+    return arc
+
+
+@kernel
+def sample_weights(points: Floats, offsets: Ints) -> Floats:
+    """Weight of each point as an observation of the true boundary.
+
+    A mid-side is off by up to half a pixel ACROSS its side only. Of a nearly straight boundary with runs of r sides
+    from step to step, the sides along the runs are off by that much, the side at a step by 1 / r of it::
+
+        ___a___b___c___                      a, b, c, d, e, f: weight 1
+                       |                     s: weight r^2, the lesser of both runs, here 9
+                       s___d___e___f___
+
+    Corners of pixels between two sides of a run lie halfway between their samples and say nothing: weight 0.
+    """
+    weight = np.zeros(len(points))
+    run = np.zeros(len(points), np.int64)
+    for c in range(len(offsets) - 1):
+        first, last = offsets[c], offsets[c + 1] - 1
+        weight[first] = weight[last] = 1.0
+        begin, kind, length = first, -1, 0
+        for i in range(first, last + 2):
+            this = 2 if i > last else _side(points, i)
+            if this < 0:
+                continue
+            if this != kind:
+                for k in range(begin, i):
+                    run[k] = length
+                begin, kind, length = i, this, 0
+            length += 1
+        for i in range(first, last + 1):
+            if _side(points, i) >= 0:
+                weight[i] = 1.0
+                if run[i] == 1 and first < i < last:
+                    weight[i] = min(min(run[i - 1], run[i + 1]), _LONGEST_RUN) ** 2
+    return weight
+
+
+@kernel
+def _side(points: Floats, i: int) -> int:
+    """0 for the middle of a horizontal side of a pixel, 1 for a vertical one, -1 for a corner."""
+    if points[i, 0] != np.floor(points[i, 0]):
+        return 0
+    return 1 if points[i, 1] != np.floor(points[i, 1]) else -1
+
+
+def pin_ends(points: Floats, curves: Curves, node: Floats) -> None:
+    """Put chain ends on their nodes, in place; chains on the border become straight between theirs."""
+    first, last = curves.offsets[:-1], curves.offsets[1:] - 1
+    is_open = curves.ends[:, 0] >= 0
+    points[last[~is_open]] = points[first[~is_open]]
+    on_frame = np.flatnonzero(per_point(curves, is_open & curves.is_frame))
+    c = np.searchsorted(curves.offsets, on_frame, side="right") - 1
+    start, end = node[curves.ends[c, 0]], node[curves.ends[c, 1]]
+    points[on_frame] = start + (curves.arc[on_frame] / curves.arc[last[c]])[:, None] * (end - start)
+    points[first[is_open]], points[last[is_open]] = node[curves.ends[is_open, 0]], node[curves.ends[is_open, 1]]
+
+
+def per_point(curves: Curves, values: NDArray[Any]) -> NDArray[Any]:
+    """Repeat one value a chain for each of its dense points."""
+    return np.repeat(values, np.diff(curves.offsets))
+
+
+@verb
+def line_beside(
+    curves: Curves, c: int, i: int, step: int, near: float, far: float
+) -> tuple[int, float, float, float, float, float]:
+    """Total least squares line through the points of chain c from arc `near` to `far` on one side of its point i.
+
+    Gives the number of points a point on the line relative to point i, its
+    direction (away from point i) and the residual:
+    root of the weighted sum of squares over the number of points.
+    """
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    n, k, gone = 0, i, 0.0
+    g = x = y = xx = xy = yy = 0.0
+    while gone <= far:
+        if gone >= near:
+            dx, dy = curves.raw[k, 0] - curves.raw[i, 0], curves.raw[k, 1] - curves.raw[i, 1]
+            q = curves.weight[k]
+            n, g, x, y = n + 1, g + q, x + q * dx, y + q * dy
+            xx, xy, yy = xx + q * dx * dx, xy + q * dx * dy, yy + q * dy * dy
+        if k == (last if step > 0 else first):
+            if curves.ends[c, 0] >= 0:
+                break
+            k = first if step > 0 else last
+        k += step
+        gone += abs(curves.arc[k] - curves.arc[k - step])
+    if n < 2 or g == 0.0:
+        return 0, 0.0, 0.0, 1.0, 0.0, 0.0
+    x, y = x / g, y / g
+    xx, xy, yy = xx / g - x * x, xy / g - x * y, yy / g - y * y
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    spread = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
+    tx, ty = np.cos(angle), np.sin(angle)
+    if tx * x + ty * y < 0:
+        tx, ty = -tx, -ty
+    return n, x, y, tx, ty, np.sqrt(max(spread, 0.0) * g / n)
+
+
+def started_at(curves: Curves, flags: Flags) -> tuple[Curves, Flags]:
+    """Turn closed chains round so that they start at their first flagged point, and the flags with them."""
+    size = np.diff(curves.offsets)
+    first = curves.offsets[:-1]
+    closed = curves.ends[:, 0] < 0
+    flagged = np.where(flags, np.arange(len(flags)), len(flags))
+    by = np.minimum.reduceat(flagged, first) - first
+    by[~closed | (by >= size)] = 0
+    period = per_point(curves, np.where(closed, size - 1, size))
+    within = np.arange(len(flags)) - per_point(curves, first)
+    order = per_point(curves, first) + (within + per_point(curves, by)) % period
+    raw = curves.raw[order]
+    return curves._replace(raw=raw, arc=arc_lengths(raw, curves.offsets), weight=curves.weight[order]), flags[order]

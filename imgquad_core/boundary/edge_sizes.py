@@ -1,0 +1,157 @@
+"""The final edge length wanted at every dense point of the curves.
+
+It is the least of the asked size, a share of the local feature size, and what the bend of the curve allows; it then
+grows away from fine places no faster than `growth` from one element to the next, through the plane (a raster of the
+picture) and along the chain (where neighbouring edges keep within `edge_ratio`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.jit import kernel
+
+from .curves import Curves
+from .feature_size import local_feature_size
+
+_FINEST = 0.5  # px, smallest edge length asked for in thin places; pixels leave none under 0.7 px
+_FINEST_BEND = 1.0  # and where the curve only bends
+_ACROSS = 1.0  # edge length over local feature size: coarse segments are at most twice as long as the place is wide
+_BEND = 4.0  # arc over distance of a foreign point; chains that meet at more than 29 degrees do not count as thin
+_TURN = 0.55  # radians from one edge to the next
+_PAST_ENDS = 2  # ends of chains that a fine place reaches past
+_OVER = 2.0  # px of arc to each side over which the bend is measured
+
+
+def edge_sizes(
+    points: Floats,
+    curves: Curves,
+    limit: Floats,
+    is_corner: Flags,
+    growth: float,
+    edge_ratio: float,
+    shape: tuple[int, int],
+) -> Floats:
+    """Wanted length of final edges at each dense point.
+
+    Parameters
+    ----------
+    points : float64, shape (n, 2)
+        Smoothed dense points.
+    curves : Curves
+        Their chains.
+    limit : float64, shape (n,)
+        Largest length asked for at each point.
+    is_corner : bool, shape (n,)
+        Points where the curve may turn at once.
+    growth, edge_ratio : float
+        Largest ratio of neighbouring elements, and of neighbouring edges of a chain.
+    shape : tuple of int
+        (n_rows, n_cols) of the picture.
+
+    Returns
+    -------
+    float64, shape (n,)
+        Length in pixels.
+    """
+    reach = min(float(limit.max()) / _ACROSS, float(np.hypot(*shape)))
+    lfs = local_feature_size(points, curves, reach, _BEND)
+    size = np.minimum(limit, _ACROSS * lfs)
+    _limit_turn(points, curves.offsets, curves.arc, np.cumsum(is_corner), size)
+    size = np.minimum(np.maximum(size, _FINEST), limit)
+    return grade(size, points, curves, growth, edge_ratio, shape)
+
+
+def grade(
+    size: Floats, points: Floats, curves: Curves, growth: float, edge_ratio: float, shape: tuple[int, int]
+) -> Floats:
+    """Limit how fast `size` grows away from fine places."""
+    slope = 2.0 * (growth - 1.0) / (growth + 1.0)
+    if size.min() < size.max():
+        raster = np.full(shape, np.inf, np.float32)
+        size = _grade_plane(size, points, slope, raster)
+    return grade_chains(size, curves, int(curves.ends.max(initial=-1)) + 1, edge_ratio)
+
+
+def grade_chains(size: Floats, curves: Curves, n_nodes: int, edge_ratio: float) -> Floats:
+    """Limit how fast `size` grows along the chains, and past their ends."""
+    is_open = curves.ends[:, 0] >= 0
+    node = curves.ends[is_open].ravel()
+    place = np.stack([curves.offsets[:-1], curves.offsets[1:] - 1], axis=1)[is_open].ravel()
+    for _ in range(_PAST_ENDS):
+        size = grade_along(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
+        least = np.full(n_nodes, np.inf)
+        np.minimum.at(least, node, size[place])
+        size[place] = least[node]
+    return grade_along(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
+
+
+@kernel
+def _limit_turn(points: Floats, offsets: Ints, arc: Floats, corners: Ints, size: Floats) -> None:
+    """`corners` counts the corners up to each point."""
+    for c in range(len(offsets) - 1):
+        first, last = offsets[c], offsets[c + 1] - 1
+        back = ahead = first
+        for i in range(first + 1, last):
+            while arc[i] - arc[back] > _OVER:
+                back += 1
+            while ahead < last and arc[ahead] - arc[i] < _OVER:
+                ahead += 1
+            if corners[ahead] > corners[max(back - 1, 0)]:
+                continue
+            ux, uy = points[i, 0] - points[back, 0], points[i, 1] - points[back, 1]
+            vx, vy = points[ahead, 0] - points[i, 0], points[ahead, 1] - points[i, 1]
+            turn = abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
+            apart = 0.5 * (np.hypot(ux, uy) + np.hypot(vx, vy))
+            if turn * size[i] > _TURN * apart:
+                size[i] = max(_TURN * apart / turn, min(size[i], _FINEST_BEND))
+
+
+def _grade_plane(size: Floats, points: Floats, slope: float, raster: NDArray[np.float32]) -> Floats:
+    """Two chamfer passes over the pixels, then back to the points."""
+    row = np.minimum(points[:, 1].astype(np.int64), raster.shape[0] - 1)
+    column = np.minimum(points[:, 0].astype(np.int64), raster.shape[1] - 1)
+    np.minimum.at(raster, (row, column), size.astype(np.float32))
+    for forward in (True, False):
+        _chamfer(raster, np.float32(slope), np.float32(slope * np.sqrt(2.0)), forward)
+    return np.minimum(size, raster[row, column])
+
+
+@kernel
+def _chamfer(raster: NDArray[np.float32], straight: np.float32, slanting: np.float32, forward: bool) -> None:
+    """Carry sizes to the pixels below and to the right, or above and to the left."""
+    n_rows, n_cols = raster.shape
+    step = 1 if forward else -1
+    for i in range(n_rows):
+        r = i if forward else n_rows - 1 - i
+        for j in range(n_cols):
+            c = j if forward else n_cols - 1 - j
+            best = raster[r, c]
+            if j > 0:
+                best = min(best, raster[r, c - step] + straight)
+            if i > 0:
+                best = min(best, raster[r - step, c] + straight)
+                if c > 0:
+                    best = min(best, raster[r - step, c - 1] + slanting)
+                if c < n_cols - 1:
+                    best = min(best, raster[r - step, c + 1] + slanting)
+            raster[r, c] = best
+
+
+@kernel
+def grade_along(values: Floats, arc: Floats, offsets: Ints, ends: Ints, slope: float) -> Floats:
+    """Limit values so that they grow by no more than `slope` times the arc along each chain."""
+    values = values.copy()
+    for c in range(len(offsets) - 1):
+        first, last = offsets[c], offsets[c + 1] - 1
+        for _ in range(1 if ends[c, 0] >= 0 else 2):  # a closed chain needs the second round
+            if ends[c, 0] < 0:
+                values[first] = min(values[first], values[last])
+                values[last] = values[first]
+            for i in range(first + 1, last + 1):
+                values[i] = min(values[i], values[i - 1] + slope * (arc[i] - arc[i - 1]))
+            for i in range(last - 1, first - 1, -1):
+                values[i] = min(values[i], values[i + 1] + slope * (arc[i + 1] - arc[i]))
+    return values

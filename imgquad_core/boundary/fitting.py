@@ -1,0 +1,289 @@
+"""Local quadratic least squares along the chains: the paper's smoothing, in a frame that works for any direction.
+
+The paper fits ``f(x) = a + b x + c x^2`` to the samples, which fails where a boundary is vertical. Here x AND y are
+quadratics of the length u along the pixel boundary, fitted around every point with a bell-shaped weight; the point
+moves to the value at u = 0. The window is the widest one whose residual across the curve is still the noise of
+pixel stairs, so straight and gently bent boundaries are averaged over long stretches and details stay.
+
+Over a wide window a quadratic is off for two reasons: the length along pixels runs up to 8 % faster in some directions
+than in others, and a bend is no parabola. So where windows are wide, quartics of the length along the quadratics'
+curve take over, in a window half as wide again, which averages as much. A circle of radius 40 comes out with 0.06 px
+(rms) of noise instead of 0.08, and that in longer waves: half the slope.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.jit import kernel, verb
+
+WINDOWS = (3.0, 4.5, 6.5, 9.5, 14.0, 20.0, 30.0, 45.0, 65.0)  #: half widths that are tried, px of arc
+STAIR_NOISE = 0.33  #: px; steps of a digital straight line have a deviation of 1 / sqrt(12) = 0.289, some more
+_EVERY = 4  # windows are chosen at every 4th point
+_DARING = 20.0  # wider ones only if the last two did
+_SLOPE = 0.5  # and change by this much a px of arc
+_SINGULAR = 1e-9  # least determinant of moments over the product of their diagonal: two samples fix no quadratic
+_WIDER = 1.5  # window of the quartic over that of the quadratic: the same noise
+_DETAIL, _WIDE = 6.5, 14.0  # px; windows below the one keep quadratics, above the other they get quartics
+_LEAST_PIVOT = 1e-9  # over the sum of weights
+_SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are: regression would let them collapse
+
+
+@verb
+def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats) -> float:
+    """Weighted sums within +-w of point i, with u = s - s[i] and x, y relative to it.
+
+    sums[0:5] of u^0..u^4, [5:8] of x, u x, u^2 x, [8:11] of y, u y, u^2 y, [11:14] of x x, x y, y y.
+    Gives the sum of the bell alone, over the samples that count.
+    """
+    for k in range(14):
+        sums[k] = 0.0
+    count = 0.0
+    for step in (-1, 1):
+        j = i if step == 1 else i - 1
+        while 0 <= j < len(s) and abs(s[j] - s[i]) <= w:
+            u, px, py = s[j] - s[i], x[j] - x[i], y[j] - y[i]
+            t = u / w
+            g = 1.0 - 0.47 * t * t
+            g *= g
+            count += g * (q[j] > 0.0)
+            g *= q[j]
+            gu, guu = g * u, g * u * u
+            sums[0] += g
+            sums[1] += gu
+            sums[2] += guu
+            sums[3] += guu * u
+            sums[4] += guu * u * u
+            sums[5] += g * px
+            sums[6] += gu * px
+            sums[7] += guu * px
+            sums[8] += g * py
+            sums[9] += gu * py
+            sums[10] += guu * py
+            sums[11] += g * px * px
+            sums[12] += g * px * py
+            sums[13] += g * py * py
+            j += step
+    return count
+
+
+@verb
+def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
+    """Coefficients of the quadratic with moments m[0:5] and right-hand side b (Cramer); 0 if too few samples tell."""
+    a00 = m[2] * m[4] - m[3] * m[3]
+    a01 = m[2] * m[3] - m[1] * m[4]
+    a02 = m[1] * m[3] - m[2] * m[2]
+    a11 = m[0] * m[4] - m[2] * m[2]
+    a12 = m[1] * m[2] - m[0] * m[3]
+    a22 = m[0] * m[2] - m[1] * m[1]
+    det = m[0] * a00 + m[1] * a01 + m[2] * a02
+    if not det > _SINGULAR * m[0] * m[2] * m[4]:
+        return 0.0, 0.0, 0.0
+    return (
+        (a00 * b0 + a01 * b1 + a02 * b2) / det,
+        (a01 * b0 + a11 * b1 + a12 * b2) / det,
+        (a02 * b0 + a12 * b1 + a22 * b2) / det,
+    )
+
+
+@verb
+def quadratic_at(
+    x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats
+) -> tuple[float, float, float]:
+    """Fit around point i: its shift in x and in y, and the root mean square residual across the curve."""
+    count = _sum_up(x, y, s, q, i, w, sums)
+    x0, x1, x2 = _solve(sums, sums[5], sums[6], sums[7])
+    y0, y1, y2 = _solve(sums, sums[8], sums[9], sums[10])
+    xx = sums[11] - x0 * sums[5] - x1 * sums[6] - x2 * sums[7]
+    xy = sums[12] - x0 * sums[8] - x1 * sums[9] - x2 * sums[10]
+    yy = sums[13] - y0 * sums[8] - y1 * sums[9] - y2 * sums[10]
+    across = (y1 * y1 * xx - 2 * x1 * y1 * xy + x1 * x1 * yy) / (x1 * x1 + y1 * y1 + 1e-300)
+    return x0, y0, np.sqrt(max(across, 0.0) / count)
+
+
+@verb
+def _quartic_at(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, a: Floats) -> tuple[float, float]:
+    """Fit a quartic around point i: its shift in x and in y.
+
+    Row r of the normal equations `a` is that of (u / w)^(4 - r), the right-hand sides of x and y are its last columns:
+    what is left of the last row when the others are eliminated is the value at u = 0.
+    """
+    for r in range(5):
+        for c in range(7):
+            a[r, c] = 0.0
+    for step in (-1, 1):
+        j = i if step == 1 else i - 1
+        while 0 <= j < len(s) and abs(s[j] - s[i]) <= w:
+            t = (s[j] - s[i]) / w
+            g = 1.0 - 0.47 * t * t
+            g *= g * q[j]
+            for r in range(4, -1, -1):
+                a[r, 5] += g * (x[j] - x[i])
+                a[r, 6] += g * (y[j] - y[i])
+                power = g
+                for c in range(4, r - 1, -1):
+                    a[r, c] += power
+                    power *= t
+                g *= t
+            j += step
+    least = _LEAST_PIVOT * a[4, 4]
+    for k in range(4):
+        pivot = max(a[k, k], least)  # a power that the samples do not determine gets no share
+        for r in range(k + 1, 5):
+            share = a[k, r] / pivot
+            for c in range(r, 7):
+                a[r, c] -= share * a[k, c]
+    value = max(a[4, 4], least)
+    return a[4, 5] / value, a[4, 6] / value
+
+
+@verb
+def _choose_windows(
+    x: Floats, y: Floats, s: Floats, q: Floats, first: int, last: int, widest: float, windows: Floats, w: Floats
+) -> None:
+    """Half width of the window at points first..last of a piece, into w."""
+    sums = np.empty(14)
+    for k in range(first, last + _EVERY, _EVERY):
+        i = min(k, last)
+        w[i] = min(windows[0], widest)
+        failures = 0
+        for candidate in windows:
+            if candidate > widest or (candidate > _DARING and failures > 1):
+                break
+            _, _, rms = quadratic_at(x, y, s, q, i, candidate, sums)
+            if rms <= STAIR_NOISE:
+                w[i] = candidate
+                failures = 0
+            else:
+                failures += 1
+    for k in range(first, last, _EVERY):
+        end = min(k + _EVERY, last)
+        for i in range(k + 1, end):
+            w[i] = w[k] + (w[end] - w[k]) * (s[i] - s[k]) / (s[end] - s[k])
+    for i in range(first + 1, last + 1):
+        w[i] = min(w[i], w[i - 1] + _SLOPE * (s[i] - s[i - 1]))
+    for i in range(last - 1, first - 1, -1):
+        w[i] = min(w[i], w[i + 1] + _SLOPE * (s[i + 1] - s[i]))
+
+
+@verb
+def _put_quadratics(
+    x: Floats, y: Floats, s: Floats, q: Floats, at: int, width: Floats, closed: bool, piece: Floats, sums: Floats
+) -> None:
+    """Move the points of a piece, of which the first stands at `at`, to the values of their quadratics."""
+    n = len(piece) - 1
+    for j in range(0 if closed else 1, n):
+        dx, dy, _ = quadratic_at(x, y, s, q, at + j, width[j], sums)
+        piece[j, 0], piece[j, 1] = x[at + j] + dx, y[at + j] + dy
+    if closed:
+        piece[n, 0], piece[n, 1] = piece[0, 0], piece[0, 1]
+
+
+@verb
+def _put_quartics(
+    x: Floats, y: Floats, s: Floats, q: Floats, at: int, width: Floats, closed: bool, piece: Floats, matrix: Floats
+) -> None:
+    """Move the points of a piece on to the values of quartics, where windows are wide."""
+    n = len(piece) - 1
+    for j in range(0 if closed else 1, n):
+        share = min((width[j] - _DETAIL) / (_WIDE - _DETAIL), 1.0)
+        if share > 0.0:
+            dx, dy = _quartic_at(x, y, s, q, at + j, _WIDER * width[j], matrix)
+            piece[j, 0] += share * (x[at + j] + dx - piece[j, 0])
+            piece[j, 1] += share * (y[at + j] + dy - piece[j, 1])
+    if closed:
+        piece[n, 0], piece[n, 1] = piece[0, 0], piece[0, 1]
+
+
+@verb
+def _extend(
+    points: Floats, arc: Floats, weight: Floats, first: int, last: int, closed: bool, reach: float, out: Floats
+) -> int:
+    """Copy a piece into out (rows x, y, s, weight), `reach` more at both ends; give the place of its first point.
+
+    A closed chain goes on round, an open piece by its own image turned about its end: the curve keeps its ends.
+    """
+    n = last - first
+    length = arc[last] - arc[first]
+    before = 0
+    while before < n and (arc[last] - arc[last - before] if closed else arc[first + before] - arc[first]) < reach:
+        before += 1
+    after = 0
+    while after < n and (arc[first + after] - arc[first] if closed else arc[last] - arc[last - after]) < reach:
+        after += 1
+    for k in range(-before, n + after + 1):
+        at = k + before
+        if closed:
+            i = first + k % n
+            out[0, at], out[1, at], out[2, at] = points[i, 0], points[i, 1], arc[i] + length * (k // n)
+        elif k < 0 or k > n:
+            pin = first if k < 0 else last
+            i = first - k if k < 0 else last - (k - n)
+            out[0, at], out[1, at] = 2 * points[pin, 0] - points[i, 0], 2 * points[pin, 1] - points[i, 1]
+            out[2, at] = 2 * arc[pin] - arc[i]
+        else:
+            i = first + k
+            out[0, at], out[1, at], out[2, at] = points[i, 0], points[i, 1], arc[i]
+        out[3, at] = weight[i]
+    out[2, before + n + after + 1] = np.inf
+    return before
+
+
+@kernel
+def fit_pieces(points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed: Flags, windows: Floats) -> Floats:
+    """Smooth pieces of chains by local quadratics and, where windows are wide, quartics.
+
+    Parameters
+    ----------
+    points : float64, shape (n, 2)
+        Dense points; the ends of open pieces already where they stay.
+    arc : float64, shape (n,)
+        Length along the pixel boundary.
+    weight : float64, shape (n,)
+        How well each point is known.
+    pieces : int64, shape (k, 2)
+        First and last point of each piece.
+    closed : bool, shape (k,)
+        The piece is a whole closed chain (its last point is its first).
+    windows : float64
+        Half widths to choose from, ascending.
+
+    Returns
+    -------
+    float64, shape (n, 2)
+        Fitted points; points on no piece as they were.
+    """
+    fitted = points.copy()
+    longest = 0
+    for k in range(len(pieces)):
+        longest = max(longest, pieces[k, 1] - pieces[k, 0])
+    out = np.empty((4, 3 * longest + 4))
+    w = np.empty(3 * longest + 4)
+    width = np.empty(longest + 1)
+    true_arc = np.empty(len(points))
+    sums, matrix = np.empty(14), np.empty((5, 7))
+    for k in range(len(pieces)):
+        first, last = pieces[k, 0], pieces[k, 1]
+        n = last - first
+        length = arc[last] - arc[first]
+        widest = min(length / 4 if closed[k] else length / 2, windows[-1])
+        if (closed[k] and n < _SHORTEST_LOOP) or widest < 1.0:
+            continue
+        at = _extend(points, arc, weight, first, last, closed[k], widest, out)
+        x, y, s, q = out[0], out[1], out[2], out[3]
+        _choose_windows(x, y, s, q, at, at + n, widest, windows, w)
+        widest_chosen = 0.0
+        for j in range(n + 1):
+            width[j] = w[at + j]
+            widest_chosen = max(widest_chosen, width[j])
+        piece = fitted[first : last + 1]
+        _put_quadratics(x, y, s, q, at, width, closed[k], piece, sums)
+        if widest_chosen > _DETAIL:
+            true_arc[first] = 0.0
+            for j in range(n):
+                step = np.hypot(piece[j + 1, 0] - piece[j, 0], piece[j + 1, 1] - piece[j, 1])
+                true_arc[first + j + 1] = true_arc[first + j] + step
+            at = _extend(points, true_arc, weight, first, last, closed[k], _WIDER * widest, out)
+            _put_quartics(x, y, s, q, at, width, closed[k], piece, matrix)
+    return fitted

@@ -1,0 +1,290 @@
+"""Where the nodes lie on the curves, and how many there are.
+
+The paper moves each sample to the point of the curve that is equally far from both neighbours, and repeats this
+until the edges' lengths agree. The same is had at once by nodes at equal steps of the integral of ds / size between
+two corners: neighbours differ by what the size differs. What is left (a chord is shorter than its arc) is evened out
+by the paper's move, `even_out`, on the curve itself and in whatever direction it runs.
+
+    o = coarse node (even place), . = node halfway between them (odd place), x = corner or end of the chain
+
+    x--.--o--.--o--.--o--.--x     4 coarse segments, 8 final edges
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imgquad_core.arrays import Bytes, Flags, Floats, Ints
+from imgquad_core.chains import places_of
+from imgquad_core.geometry.conflicts import CROSSING, SHARP, find_conflicts
+from imgquad_core.jit import kernel, verb
+
+from .curves import Curves, Ends
+
+_LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
+_SHORT = 0.7  # the same beside a corner: a short piece there would keep both faces of a long chain from that
+_COARSE = 0.3  # mean size over asked size from which that is of use
+_VERY_LONG = 30.0  # coarse segments from which their number may be made a multiple of six
+_SWEEPS = 3
+_LEAST_SECTOR = np.radians(35.0)  # sharper sectors are blunted; tips of chains are rounded below 37 degrees
+
+
+def mark_sharp(
+    points: Floats,
+    chain_points: Ints,
+    offsets: Ints,
+    node_offsets: Ints,
+    sockets: Ints,
+    least: float,
+    marks: Bytes,
+) -> None:
+    """Mark the segments on both sides of sectors of less than `least` radians (below a right angle), in place."""
+    places = places_of(chain_points, offsets)
+    first = offsets[:-1] - np.arange(len(offsets) - 1)  # segments of each chain
+    last = offsets[1:] - 2 - np.arange(len(offsets) - 1)
+    previous = np.arange(len(marks)) - 1
+    previous[first] = last
+    is_sharp = _is_sharp(points, places.here, places.before, places.after, least)
+    is_sharp[first] &= chain_points[offsets[:-1]] == chain_points[offsets[1:] - 1]
+    sharp = [np.flatnonzero(is_sharp), previous[is_sharp]]
+    node = np.repeat(np.arange(len(node_offsets) - 1), np.diff(node_offsets))
+    segment = np.where(sockets % 2, last[sockets // 2], first[sockets // 2])
+    far = np.where(sockets % 2, places.here[segment], places.after[segment])
+    for step in range(1, int(np.diff(node_offsets).max(initial=0))):
+        a = np.flatnonzero(node[step:] == node[:-step])
+        a = a[_is_sharp(points, node[a], far[a], far[a + step], least)]
+        sharp += [segment[a], segment[a + step]]
+    found = np.concatenate(sharp)
+    marks[found] = np.maximum(marks[found], SHARP)
+
+
+def _is_sharp(points: Floats, v: Ints, p: Ints, q: Ints, least: float) -> Flags:
+    """Tell where the angle between the segments from v to p and to q is less than `least`."""
+    (ux, uy), (wx, wy) = (points[p] - points[v]).T, (points[q] - points[v]).T
+    return np.asarray(np.abs(ux * wy - uy * wx) < np.tan(least) * (ux * wx + uy * wy))
+
+
+class Placement(NamedTuple):
+    """Nodes on the curves: chain c has ``at[offsets[c]:offsets[c + 1]]``, both ends among them."""
+
+    offsets: Ints
+    at: Floats  #: place as a fractional index of dense points
+    is_corner: Flags
+
+
+@kernel
+def place_nodes(
+    curves: Curves,
+    size: Floats,
+    limit: Floats,
+    is_corner: Flags,
+    at_least: Ints,
+    exact: Flags,
+    in_twelves: bool,
+) -> Placement:
+    """Place the final nodes on every chain.
+
+    Parameters
+    ----------
+    curves : Curves
+        The chains.
+    size, limit : float64, shape (n,)
+        Wanted length of final edges at each dense point, and the asked one.
+    is_corner : bool, shape (n,)
+        Dense points that become nodes.
+    at_least : int64, shape (n_chains,)
+        Least number of coarse segments of each chain.
+    exact : bool, shape (n_chains,)
+        Chains that get a coarse node at every dense point.
+    in_twelves : bool
+        Whether very long pieces get a multiple of twelve final edges.
+
+    Returns
+    -------
+    Placement
+        An even number of final edges for every piece between corners.
+    """
+    cost = np.zeros(len(size))
+    n_nodes = 0
+    for c in range(len(exact)):
+        for i in range(curves.offsets[c] + 1, curves.offsets[c + 1]):
+            step = curves.arc[i] - curves.arc[i - 1]
+            cost[i] = cost[i - 1] + 2 * step / (size[i] + size[i - 1])
+            n_nodes += 2
+        n_nodes += 8 + int(cost[curves.offsets[c + 1] - 1]) * 2
+    offsets = np.zeros(len(exact) + 1, np.int64)
+    for c in range(len(is_corner)):
+        n_nodes += 16 * is_corner[c]
+    at = np.empty(n_nodes)
+    corner = np.zeros(len(at), np.bool_)
+    for c in range(len(exact)):
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        n = offsets[c]
+        at[n] = first
+        corner[n] = is_corner[first]
+        begin = first
+        pieces = 1
+        for i in range(first + 1, last):
+            pieces += is_corner[i]
+        for i in range(first + 1, last + 1):
+            if i < last and not is_corner[i] and not exact[c]:
+                continue
+            least = -(-at_least[c] // pieces)
+            number = 1 if exact[c] else _count(curves, cost, limit, is_corner, begin, i, least, in_twelves)
+            _divide(cost, begin, i, 2 * number, at, n)
+            n += 2 * number
+            corner[n] = is_corner[i]
+            begin = i
+        offsets[c + 1] = n + 1
+    return Placement(offsets, at[: offsets[-1]], corner[: offsets[-1]])
+
+
+@verb
+def _count(
+    curves: Curves, cost: Floats, limit: Floats, is_corner: Flags, begin: int, end: int, least: int, in_twelves: bool
+) -> int:
+    """Choose the number of coarse segments of a piece."""
+    total = 0.5 * (cost[end] - cost[begin])
+    length = curves.arc[end] - curves.arc[begin]
+    enough = _SHORT if is_corner[begin] or is_corner[end] else _LONG
+    if total > enough and length > 2 * _COARSE * total * limit[begin]:
+        step = 6 if in_twelves and total > _VERY_LONG else 2
+        return step * max(int(total / step + 0.5), max((least + step - 1) // step, 1))
+    return max(int(np.ceil(total - 0.3)), least)
+
+
+@verb
+def _divide(cost: Floats, begin: int, end: int, number: int, at: Floats, n: int) -> None:
+    """Put `number` equal steps of cost between two dense points behind node n."""
+    j = begin
+    for k in range(1, number):
+        target = cost[begin] + (cost[end] - cost[begin]) * k / number
+        while j < end - 1 and cost[j + 1] < target:
+            j += 1
+        at[n + k] = j + (target - cost[j]) / (cost[j + 1] - cost[j])
+    at[n + number] = end
+
+
+@verb
+def _point(points: Floats, at: float) -> tuple[float, float]:
+    i = min(int(at), len(points) - 2)
+    t = at - i
+    return (
+        points[i, 0] + t * (points[i + 1, 0] - points[i, 0]),
+        points[i, 1] + t * (points[i + 1, 1] - points[i, 1]),
+    )
+
+
+def points_at(points: Floats, at: Floats) -> Floats:
+    """Points of the curves at fractional indices."""
+    i = np.minimum(at.astype(np.int64), len(points) - 2)
+    return np.asarray(points[i] + (at - i)[:, None] * (points[i + 1] - points[i]))
+
+
+@kernel
+def even_out(points: Floats, placed: Placement, exact: Flags, edge_ratio: float) -> None:
+    """Move nodes towards the bisector of their neighbours, along the curve, until edges keep within `edge_ratio`.
+
+    A node goes halfway to the point of the curve where the edges to both neighbours are equal, which is where the
+    curve crosses the perpendicular bisector (paper, eq. 1). Corners and chains of `exact` stay as they are.
+    """
+    at = placed.at
+    for c in range(len(exact)):
+        first, last = placed.offsets[c], placed.offsets[c + 1] - 1
+        for _ in range(0 if exact[c] else _SWEEPS):
+            ax, ay = _point(points, at[first])
+            x, y = _point(points, at[first + 1])
+            for k in range(first + 1, last):
+                bx, by = _point(points, at[k + 1])
+                before, after = np.hypot(x - ax, y - ay), np.hypot(bx - x, by - y)
+                if not placed.is_corner[k] and max(before, after) > edge_ratio * min(before, after):
+                    at[k] = 0.5 * (at[k] + _bisector_crossing(points, at[k - 1], at[k + 1], ax, ay, bx, by))
+                    x, y = _point(points, at[k])
+                ax, ay, x, y = x, y, bx, by
+
+
+@verb
+def _bisector_crossing(points: Floats, low: float, high: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Where the curve from node a to node b crosses the perpendicular bisector of their chord."""
+    nx, ny = bx - ax, by - ay
+    offset = 0.5 * (nx * (ax + bx) + ny * (ay + by))
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        x, y = _point(points, middle)
+        if nx * x + ny * y < offset:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+class Nodes(NamedTuple):
+    """Nodes on the curves, with ids: ends of chains first, then the others chain by chain."""
+
+    points: Floats  #: (n, 2)
+    chain_points: Ints  #: ids of the nodes of every chain, in the order of `placed.at`
+    placed: Placement
+
+
+class Level(NamedTuple):
+    """Polylines through all nodes (final edges), or through every second one (coarse)."""
+
+    chain_points: Ints
+    offsets: Ints
+    segments: Ints  #: (m, 2)
+    chain: Ints  #: (m,) chain of each segment
+    at: Floats  #: places of the points on the curves
+
+
+def number_nodes(curves: Curves, n_ends: int, xy: Floats, placed: Placement) -> Nodes:
+    """Give ids to placed nodes at `xy`."""
+    first, last = placed.offsets[:-1], placed.offsets[1:] - 1
+    closed = curves.ends[:, 0] < 0
+    is_inner = np.ones(len(xy), bool)
+    is_inner[first[~closed]] = False
+    is_inner[last] = False
+    n_inner = int(np.count_nonzero(is_inner))
+    ids = np.empty(len(xy), np.int64)
+    ids[is_inner] = n_ends + np.arange(n_inner)
+    ids[first[~closed]], ids[last[~closed]] = curves.ends[~closed].T
+    ids[last[closed]] = ids[first[closed]]
+    points = np.empty((n_ends + n_inner, 2))
+    points[ids] = xy
+    return Nodes(points, ids, placed)
+
+
+def level_of(nodes: Nodes, step: int) -> Level:
+    """Take every `step`-th node of each chain."""
+    offsets = nodes.placed.offsets
+    within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], np.diff(offsets))
+    taken = within % step == 0
+    chain_points = nodes.chain_points[taken]
+    counts = (np.diff(offsets) - 1) // step
+    starts = np.concatenate([[0], np.cumsum(counts + 1)])
+    pairs = np.stack([chain_points[:-1], chain_points[1:]], axis=1)
+    inside = np.ones(len(pairs), bool)
+    inside[starts[1:-1] - 1] = False
+    chain = np.repeat(np.arange(len(counts)), counts)
+    return Level(chain_points, starts, pairs[inside], chain, nodes.placed.at[taken])
+
+
+def mark_conflicts(
+    points: Floats, level: Level, ends: Ends, is_new: Flags, gently: bool, shape: tuple[int, int]
+) -> Bytes:
+    """Mark the segments of a level that cross or touch; `gently` also those too close or at too sharp sectors.
+
+    Only pairs with a segment on a chain of `is_new` are tested for the former.
+    """
+    marks = find_conflicts(points, level.segments, level.chain, is_new, shape)
+    if gently:
+        mark_sharp(points, level.chain_points, level.offsets, ends.offsets, ends.sockets, _LEAST_SECTOR, marks)
+    else:
+        marks[marks < CROSSING] = 0
+    return marks
+
+
+def any_of_chain(flags: Flags, offsets: Ints) -> Flags:
+    """Tell for each chain whether any of its entries is flagged."""
+    return np.logical_or.reduceat(flags, offsets[:-1])

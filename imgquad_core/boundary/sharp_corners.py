@@ -1,0 +1,198 @@
+"""Sharp corners of chains: where two straight sides meet, and one quadratic cannot follow them.
+
+A corner of a square inclusion is cut by the pixel boundary from mid-side to mid-side; its true place is where the
+lines through both sides meet. Chains are split there, so that smoothing leaves the corner alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.jit import kernel, verb
+
+from .curves import Curves, line_beside, started_at
+from .fitting import quadratic_at
+
+_SIDE = 6.0  # px of arc of each side
+_SIDES = np.array([_SIDE, 26.0, 18.0, 12.0, 8.5, _SIDE])  # a first look; then the longest that are straight tell
+_NEAR = 0.4  # px beside the corner that are left out
+_STRAIGHT = 0.32  # px, largest residual (rms) of a side
+_TURN, _TIP = 0.8, 2.5  # radians, least and largest turn between the sides; beyond it is the round tip of a line
+_UNLIKE = 0.20  # px, least residual of one quadratic through both sides
+_FARTHEST = 2.0  # px from the pixel boundary
+_APART = 4.2  # px of arc between corners
+_AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
+
+
+def find_corners(curves: Curves) -> tuple[Curves, Flags]:
+    """Find sharp corners; closed chains that have some are turned round to start at one.
+
+    Parameters
+    ----------
+    curves : Curves
+        The pixel boundary.
+
+    Returns
+    -------
+    Curves
+        The same chains.
+    is_corner : bool, shape (n,)
+        Dense points that are corners; where a closed chain starts at one, its last point too.
+    """
+    return started_at(curves, _find(curves, _SIDES))
+
+
+def place_corners(curves: Curves, is_corner: Flags, room: Floats, points: Floats) -> None:
+    """Move corners to where the lines of their sides meet, in place, by no more than `room`."""
+    _place(curves, is_corner, room, _SIDES, points)
+
+
+@kernel
+def _place(curves: Curves, is_corner: Flags, room: Floats, lengths: Floats, points: Floats) -> None:
+    for c in range(len(curves.ends)):
+        for i in range(curves.offsets[c], curves.offsets[c + 1]):
+            if is_corner[i]:
+                _, dx, dy = _corner_at(curves, c, i, lengths)
+                scale = min(1.0, room[i] / max(np.hypot(dx, dy), 1e-9))
+                points[i, 0], points[i, 1] = curves.raw[i, 0] + scale * dx, curves.raw[i, 1] + scale * dy
+
+
+@kernel
+def beside_corners(curves: Curves, is_corner: Flags) -> Ints:
+    """Return for each dense point the corner that it is within a side's length of; -1 for none."""
+    corner = np.full(len(curves.raw), -1, np.int64)
+    for c in range(len(curves.ends)):
+        for i in range(curves.offsets[c], curves.offsets[c + 1]):
+            if is_corner[i]:
+                corner[i] = i
+                for step in (-1, 1):
+                    _mark_side(curves, c, i, step, is_corner, corner)
+    return corner
+
+
+@verb
+def _mark_side(curves: Curves, c: int, i: int, step: int, is_corner: Flags, corner: Ints) -> None:
+    """Mark the points on one side of corner i, up to the next corner or the end of the chain."""
+    begin, end = curves.offsets[c], curves.offsets[c + 1] - 1
+    if step < 0:
+        begin, end = end, begin
+    k, gone = i, 0.0
+    while gone <= _SIDE:
+        if k == end:
+            if curves.ends[c, 0] >= 0:
+                break
+            k = begin  # the same place of a closed chain
+            corner[k] = i
+        k += step
+        gone += abs(curves.arc[k] - curves.arc[k - step])
+        if is_corner[k]:
+            break
+        corner[k] = i
+
+
+@kernel
+def _find(curves: Curves, lengths: Floats) -> Flags:
+    score = np.zeros(len(curves.raw))
+    is_corner = np.zeros(len(curves.raw), np.bool_)
+    x, y, s, q, sums = np.empty(99), np.empty(99), np.empty(99), np.full(99, 1.0), np.empty(14)
+    for c in range(len(curves.ends)):
+        if curves.is_frame[c]:
+            continue
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        for i in range(first + (curves.ends[c, 0] >= 0), last):
+            straight, dx, dy = _corner_at(curves, c, i, lengths)
+            if straight <= 0.0:
+                continue
+            middle = _gather(curves, c, i, x, y, s)
+            gain = quadratic_at(x, y, s, q, middle, _SIDE, sums)[2]
+            if gain >= _UNLIKE:
+                j = _nearest(curves, c, i, curves.raw[i, 0] + dx, curves.raw[i, 1] + dy)
+                score[j] = max(score[j], gain + straight)
+        for i in range(first, last):
+            if score[i] > 0.0 and _is_best(curves, c, i, score):
+                is_corner[i] = _corner_at(curves, c, i, lengths)[0] > 0.0
+    return is_corner
+
+
+@verb
+def _corner_at(curves: Curves, c: int, i: int, lengths: Floats) -> tuple[float, float, float]:
+    """How straight the sides of point i are (0: no corner), and the shift to where their lines meet.
+
+    The longest sides that are straight tell: lines through 6 px of pixel stairs are off by up to 6 degrees.
+    """
+    step = curves.ends.shape[1] - 1  # 1, but not a literal: those are compiled for on their own
+    for k in range(len(lengths)):
+        n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, lengths[k])
+        m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, lengths[k])
+        is_straight = max(rms_u, rms_v) <= _STRAIGHT
+        if k == 0 and (n < 6 or m < 6 or not is_straight or _turn(ux, uy, vx, vy) < _TURN):
+            return 0.0, 0.0, 0.0
+        if k > 0 and is_straight:
+            break
+    if not _TURN <= _turn(ux, uy, vx, vy) <= _TIP:
+        return 0.0, 0.0, 0.0
+    t = ((bx - ax) * vy - (by - ay) * vx) / (ux * vy - uy * vx)
+    x, y = ax + t * ux, ay + t * uy
+    if not (x * x + y * y < _FARTHEST**2 and x * ux + y * uy < _AHEAD and x * vx + y * vy < _AHEAD):
+        return 0.0, 0.0, 0.0
+    return 1.0 - max(rms_u, rms_v), x, y
+
+
+@verb
+def _turn(ux: float, uy: float, vx: float, vy: float) -> float:
+    """Turn from one side to the other, of directions that both lead away from the corner."""
+    return float(np.pi - abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy)))
+
+
+@verb
+def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> int:
+    """Copy the points around i; gives the place of i among them."""
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    low = high = i
+    if curves.ends[c, 0] >= 0:
+        while low > first and curves.arc[i] - curves.arc[low] < _SIDE:
+            low -= 1
+        while high < last and curves.arc[high] - curves.arc[i] < _SIDE:
+            high += 1
+    else:
+        low, high = i - 12, i + 12
+    n, length = last - first, curves.arc[last]
+    for k in range(low, high + 1):
+        j = first + (k - first) % n if curves.ends[c, 0] < 0 else k
+        x[k - low], y[k - low] = curves.raw[j, 0], curves.raw[j, 1]
+        s[k - low] = curves.arc[j] + (length * ((k - first) // n) if curves.ends[c, 0] < 0 else 0.0)
+    s[high - low + 1] = np.inf
+    return i - low
+
+
+@verb
+def _nearest(curves: Curves, c: int, i: int, x: float, y: float) -> int:
+    """Point of the chain nearest to (x, y), within 6 points of i."""
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    best, nearest = i, np.inf
+    for k in range(i - 6, i + 7):
+        if curves.ends[c, 0] >= 0 and not first < k < last:
+            continue
+        j = first + (k - first) % (last - first) if curves.ends[c, 0] < 0 else k
+        d2 = (curves.raw[j, 0] - x) ** 2 + (curves.raw[j, 1] - y) ** 2
+        if d2 < nearest - 1e-9:
+            best, nearest = j, d2
+    return best
+
+
+@verb
+def _is_best(curves: Curves, c: int, i: int, score: Floats) -> bool:
+    """Is there no better corner near point i? The first one wins a tie."""
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    length = curves.arc[last]
+    for k in range(i - 12, i + 13):
+        if curves.ends[c, 0] >= 0 and not first < k < last:
+            continue
+        j = first + (k - first) % (last - first) if curves.ends[c, 0] < 0 else k
+        apart = abs(curves.arc[j] - curves.arc[i])
+        if curves.ends[c, 0] < 0:
+            apart = min(apart, length - apart)
+        if apart < _APART and (score[j] > score[i] or (score[j] == score[i] and j < i)):
+            return False
+    return True

@@ -1,0 +1,200 @@
+"""Nodes without conflicts: placed, tested exactly, and drawn back towards the pixel boundary where they fail.
+
+Where polylines cross, come too close or meet at less than 35 degrees, the wanted edges get shorter and the curve is
+blended by thirds with the pixel boundary, which has gaps of 0.7 px everywhere. Chains that still fail in the end get
+exactly their pixels' points: these never cross, so the loop ends whatever the picture.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imgquad_core.arrays import Bytes, Flags, Floats, Ints
+from imgquad_core.chains import places_of
+from imgquad_core.errors import TopologyError
+from imgquad_core.geometry.conflicts import SHARP, snapped
+from imgquad_core.model import BoundaryGraph
+
+from .areas import mitres, restore_areas
+from .curves import Curves, Ends, per_point, pin_ends
+from .edge_sizes import grade_along, grade_chains
+from .nodes import Level, Nodes, any_of_chain, even_out, level_of, mark_conflicts, number_nodes, place_nodes, points_at
+
+_GENTLE_ROUNDS = 8  # that mind sectors and room; later ones only crossings
+_ROUNDS = 14  # until chains with crossings get their pixels back, and
+_LAST_ROUNDS = 6  # more until all chains do
+_PATIENCE = 2  # rounds that only place nodes closer together, unless a sector is too sharp
+_CLOSER, _LESS_CLOSE = 0.6, 0.8  # factors on the wanted length, at crossings and at sharp sectors
+_CLOSEST = 0.25  # px between nodes, and no less
+_AREA_ROOM = 0.7  # of the bound of smoothing, for the shift that restores areas
+_AREA_ROUNDS = 10
+_KINK = 0.3  # by how much the shift for areas may change along a chain, over the length
+
+
+class Draft(NamedTuple):
+    """Smoothed curves that nodes go on."""
+
+    curves: Curves
+    ends: Ends
+    smooth: Floats  #: (n, 2) dense points
+    node: Floats  #: (n_nodes, 2) place of the ends
+    is_corner: Flags  #: (n,) dense points that become nodes
+    limit: Floats  #: (n,) asked length of final edges
+    edge_ratio: float
+    in_twelves: bool  #: whether long pieces get a multiple of twelve final edges
+    shape: tuple[int, int]
+
+
+def place_freely(draft: Draft, size: Floats) -> tuple[Nodes, bool]:
+    """Place nodes without conflicts.
+
+    Parameters
+    ----------
+    draft : Draft
+        The curves.
+    size : float64, shape (n,)
+        Wanted length of final edges at each dense point.
+
+    Returns
+    -------
+    Nodes
+        Nodes whose fine and coarse polylines neither cross nor touch.
+    bool
+        They also keep room, and sectors of 35 degrees.
+    """
+    curves = draft.curves
+    at_least = _least_segments(curves.ends)
+    size, withdrawn = size.copy(), np.zeros(len(size))
+    exact, is_new = np.zeros(len(curves.ends), bool), np.ones(len(curves.ends), bool)
+    for attempt in range(_ROUNDS + _LAST_ROUNDS + 2):
+        gently = attempt < _GENTLE_ROUNDS
+        nodes = _place(draft, size, at_least, exact, withdrawn)
+        factor, pull = np.ones(len(size)), np.zeros(len(size))
+        for level in (level_of(nodes, 2), level_of(nodes, 1)):
+            marks = mark_conflicts(nodes.points, level, draft.ends, is_new, gently, draft.shape)
+            _mark_dense(marks, level, curves.offsets, attempt >= _PATIENCE, factor, pull)
+        if factor.min() == 1.0:
+            return nodes, gently
+        failed = any_of_chain(factor < 1.0, curves.offsets)
+        if attempt >= _ROUNDS:
+            exact |= failed | (attempt >= _ROUNDS + _LAST_ROUNDS)
+        shorter = np.maximum(size * factor, np.minimum(_CLOSEST, draft.limit))
+        shorter = grade_chains(shorter, curves, len(draft.node), draft.edge_ratio)
+        failed |= any_of_chain(shorter < size, curves.offsets)
+        size, withdrawn = shorter, np.where(per_point(curves, exact), 1.0, np.minimum(withdrawn + pull, 1.0))
+        is_new = _with_neighbours(curves.ends, failed | exact, len(draft.node))
+    raise TopologyError("chains of the pixel boundary itself cross or touch")
+
+
+def _least_segments(ends: Ints) -> Ints:
+    """Least number of coarse segments of each chain, so that every face has at least three."""
+    ends = np.sort(ends, axis=1)
+    _, pair, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    least = np.where(count[pair.ravel()] > 1, 2, 1)
+    least[ends[:, 0] == ends[:, 1]] = 3
+    least[ends[:, 0] < 0] = 4
+    return least.astype(np.int64)
+
+
+def _place(draft: Draft, size: Floats, at_least: Ints, exact: Flags, withdrawn: Floats) -> Nodes:
+    curves = draft.curves
+    points = draft.smooth + withdrawn[:, None] * (curves.raw - draft.smooth)
+    pin_ends(points, curves, _withdraw_ends(draft, withdrawn))
+    placed = place_nodes(curves, size, draft.limit, draft.is_corner, at_least, exact, draft.in_twelves)
+    even_out(points, placed, exact, draft.edge_ratio)
+    return number_nodes(curves, len(draft.node), snapped(points_at(points, placed.at)), placed)
+
+
+def _withdraw_ends(draft: Draft, withdrawn: Floats) -> Floats:
+    """Draw ends back as far as the chain that goes back farthest."""
+    curves = draft.curves
+    share = np.zeros(len(draft.node))
+    for side, place in ((0, curves.offsets[:-1]), (1, curves.offsets[1:] - 1)):
+        is_open = curves.ends[:, side] >= 0
+        np.maximum.at(share, curves.ends[is_open, side], withdrawn[place[is_open]])
+    return draft.node + share[:, None] * (draft.ends.place - draft.node)
+
+
+def _mark_dense(marks: Bytes, level: Level, offsets: Ints, withdraw: bool, factor: Floats, pull: Floats) -> None:
+    """For the dense points under marked segments: how much closer nodes go, and how much nearer to the pixels."""
+    k = np.flatnonzero(marks)
+    c = level.chain[k]
+    low = np.maximum(level.at[k + c].astype(np.int64) - 1, offsets[c])
+    high = np.minimum(level.at[k + c + 1].astype(np.int64) + 2, offsets[c + 1] - 1)
+    number = high - low + 1
+    under = np.arange(number.sum()) + np.repeat(low - np.cumsum(number) + number, number)
+    sharp = np.repeat(marks[k] == SHARP, number)
+    np.minimum.at(factor, under, np.where(sharp, _LESS_CLOSE, _CLOSER))
+    pull[under[sharp | withdraw]] = 1.0 / 3.0
+
+
+def _with_neighbours(ends: Ints, chains: Flags, n_nodes: int) -> Flags:
+    """Add the chains that meet these: their nodes move too."""
+    node = np.zeros(n_nodes + 1, bool)  # the last one for closed chains
+    node[ends[chains].ravel()] = True
+    node[-1] = False
+    return np.asarray(chains | node[ends].any(axis=1))
+
+
+def restore_areas_freely(
+    graph: BoundaryGraph, draft: Draft, nodes: Nodes, room: Floats, max_shift: float, gently: bool
+) -> Nodes:
+    """Give regions their areas; less where that makes conflicts.
+
+    Parameters
+    ----------
+    graph : BoundaryGraph
+        The pixel boundary.
+    draft, nodes
+        The curves, and their nodes without conflicts.
+    room : float64, shape (n,)
+        How far smoothing could move each dense point.
+    max_shift : float
+        Largest distance from the pixel boundary.
+    gently : bool
+        Mind room and sectors too, as the nodes do.
+    """
+    placed = nodes.placed
+    bound = _area_bounds(draft.curves, nodes, room, max_shift)
+    shift, tested = np.zeros(graph.n_chains), nodes.points
+    had_conflicts = np.zeros(graph.n_chains, bool)
+    for attempt in range(_AREA_ROUNDS):
+        points, shift = restore_areas(
+            nodes.points, nodes.chain_points, placed.offsets, graph.chain_regions, graph.region_pixels, bound, shift
+        )
+        points = snapped(points)
+        has_moved = any_of_chain((points != tested).any(axis=1)[nodes.chain_points], placed.offsets)
+        has_moved |= had_conflicts
+        is_bad = np.zeros(len(points), bool)
+        for level in (level_of(nodes, 2), level_of(nodes, 1)):
+            marks = mark_conflicts(points, level, draft.ends, has_moved, gently, draft.shape)
+            is_bad[level.segments[marks > 0]] = True
+        if not is_bad.any():
+            return nodes._replace(points=points)
+        bound[_widened(is_bad[nodes.chain_points])] *= 0.5 if attempt == 0 else 0.0
+        tested, had_conflicts = points, any_of_chain(is_bad[nodes.chain_points], placed.offsets)
+    return nodes
+
+
+def _widened(flags: Flags) -> Flags:
+    wide = flags.copy()
+    wide[1:] |= flags[:-1]
+    wide[:-1] |= flags[1:]
+    return wide
+
+
+def _area_bounds(curves: Curves, nodes: Nodes, room: Floats, max_shift: float) -> Floats:
+    """How far the segments at each node may be shifted: little beside nodes that stay, so that no kink arises."""
+    offsets, at = nodes.placed.offsets, nodes.placed.at
+    gone = np.hypot(*(nodes.points[nodes.chain_points] - points_at(curves.raw, at)).T)
+    bound = np.minimum(max_shift - gone, _AREA_ROOM * room[at.astype(np.int64)])
+    places = places_of(nodes.chain_points, offsets)
+    bound[places.at] /= np.maximum(np.hypot(*mitres(nodes.points, places).T), 1.0)
+    stays = np.repeat(curves.is_frame, np.diff(offsets))
+    is_open = curves.ends[:, 0] >= 0
+    stays[offsets[:-1][is_open]] = stays[offsets[1:][is_open] - 1] = True
+    bound[stays] = 0.0
+    arc = np.interp(at, np.arange(len(curves.arc)), curves.arc)
+    return grade_along(np.maximum(bound, 0.0), arc, offsets, curves.ends, _KINK)

@@ -1,0 +1,60 @@
+"""Work on many faces in batches: small enough for the cache, independent, so that threads can share them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+import numpy as np
+
+from imgquad_core.arrays import Ints
+
+from .faces import FaceQuads, taken_out
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
+BATCH = 3000  # quads, so that a batch stays in the cache
+LARGEST = 3 * BATCH  # quads of a face that shares its batch with others
+TILE = 8  # edge lengths; quads of a batch are numbered tile by tile
+
+
+def in_batches(mesh: FaceQuads, work: Callable[[FaceQuads], Result], threads: int) -> list[Result]:
+    """Call `work` for groups of whole faces; the results come in the order of the batches, whatever the threads."""
+    return in_threads(batches_of(mesh), work, threads)
+
+
+def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) -> list[Result]:
+    """Call `work` for each part; the results come in the order of the parts, whatever the threads."""
+    if threads == 1 or len(parts) == 1:
+        return [work(part) for part in parts]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, parts))
+
+
+def batches_of(mesh: FaceQuads) -> list[FaceQuads]:
+    """Cut the mesh into groups of neighbouring faces (by number) of about `BATCH` quads, and faces that are large."""
+    if len(mesh.quads) == 0:
+        return []
+    per_face = np.bincount(mesh.face)
+    nth, alone = (np.cumsum(per_face) - per_face) // BATCH, per_face > LARGEST
+    begins = (np.diff(nth, prepend=0) > 0) | alone
+    begins[1:] |= alone[:-1]
+    batch = np.cumsum(begins)[mesh.face]
+    order = np.lexsort((_tile(mesh), mesh.face, batch))
+    ends = np.flatnonzero(np.diff(batch[order])) + 1
+    new = np.full(len(mesh.points), -1, np.int64)  # one for all parts: they share no point
+    return [taken_out(mesh, chosen, new)[0] for chosen in np.split(order, ends)]
+
+
+def is_large(batch: FaceQuads) -> bool:
+    """Whether a batch is one large face."""
+    return len(batch.quads) > LARGEST and bool((batch.face == batch.face[0]).all())
+
+
+def _tile(mesh: FaceQuads) -> Ints:
+    """Number of the tile that holds the first corner of each quad."""
+    corner = mesh.points[mesh.quads[:, 0]]
+    area = np.ptp(mesh.points, axis=0).prod() / max(1, len(mesh.quads))
+    cell = np.floor(corner / (TILE * np.sqrt(area) + 1e-300)).astype(np.int64)
+    return np.asarray(cell[:, 1] * (cell[:, 0].max() + 1) + cell[:, 0])

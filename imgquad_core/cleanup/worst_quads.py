@@ -1,0 +1,306 @@
+r"""Replace the worst quads: best quads for a small outline, whatever the valences.
+
+Around a poor quad a few small cavities are tried. Their outlines (an even number of nodes) are filled either without
+any new node, by the quads whose worst scaled Jacobian is largest (dynamic programming over the outline), or by a
+star; or the poor quad is collapsed:
+
+    b----c         b----c
+    |    |        / \    \        the quad i a b j splits an outline into three shorter ones;
+    a    d   or  a   o----d       a star joins every second node to a new one, o;
+    | /  |        \ /    /        collapsed, two opposite corners of a quad become one node
+    i----j         i----j
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.geometry.quad_shape import quad_quality
+from imgquad_core.jit import inlined, kernel, verb
+
+from .cavity import (
+    MEMBERS,
+    OUTLINE,
+    Cavity,
+    Net,
+    add_quad,
+    add_ring,
+    begin,
+    compact,
+    insert,
+    net_of,
+    remove,
+    scratch,
+    settle,
+)
+from .faces import FaceQuads
+from .patterns import Canvas
+
+LARGEST = 24  # quads of a cavity
+LONGEST = 16  # nodes of an outline
+LEAST_GAIN = 0.02  # of the worst scaled Jacobian
+ANY = 99  # quads that a node of the outline may need: valences do not count here
+ROUNDS = 3
+COLLAPSE = 6  # the first of two trials that collapse the quad
+ATTEMPTS = 3 * (COLLAPSE + 2)  # three fillings of each trial's outline
+CENTRE_STEPS = 8
+
+
+def repair(mesh: FaceQuads, below: float) -> tuple[FaceQuads, Flags]:
+    """Replace quads whose scaled Jacobian is less than `below` where that makes the worst one better.
+
+    Returns the mesh and its nodes at replaced quads or beside them.
+    """
+    if len(mesh.quads) == 0:
+        return mesh, np.zeros(0, np.bool_)
+    net = net_of(mesh, LARGEST)
+    cavity, canvas = scratch(net, LARGEST)
+    hopeless, fresh = np.zeros((2, len(net.quads)), np.bool_)
+    for _ in range(ROUNDS):
+        if _repair_pass(net, cavity, canvas, below, hopeless, fresh) == 0:
+            break
+    if not fresh.any():
+        return mesh, np.zeros(len(mesh.points), np.bool_)
+    beside = np.zeros(len(net.valence), np.bool_)
+    beside[net.quads[fresh & (net.quads[:, 0] >= 0)]] = True
+    return compact(net, mesh), beside[net.valence > 0]
+
+
+@verb
+def _best_fill(points: Floats, loop: Ints, n: int, floor: float, best: Floats, first: Ints, second: Ints) -> float:
+    """Fill the tables of the best quads for each run of an outline; return the worst quality of the best filling.
+
+    Only fillings better than `floor` count; -2 where there is none.
+    """
+    corners = np.empty((1, 4), np.int64)
+    for i in range(n - 1):
+        best[i, i + 1] = 1.0
+    for run in range(3, n, 2):
+        for i in range(n - run):
+            j = i + run
+            best[i, j] = floor
+            for a in range(i + 1, j, 2):
+                for b in range(a + 1, j, 2):
+                    rest = min(best[i, a], min(best[a, b], best[b, j]))
+                    if rest <= best[i, j]:
+                        continue
+                    corners[0, 0], corners[0, 1], corners[0, 2], corners[0, 3] = loop[i], loop[a], loop[b], loop[j]
+                    worst = min(rest, quad_quality(points, corners, 0))
+                    if worst > best[i, j]:
+                        best[i, j], first[i, j], second[i, j] = worst, a, b
+    return float(best[0, n - 1]) if best[0, n - 1] > floor else -2.0
+
+
+@verb
+def _draw_fill(canvas: Canvas, loop: Ints, n: int, first: Ints, second: Ints) -> None:
+    """Draw the quads that the tables tell."""
+    runs = np.empty((2 * n, 2), np.int64)
+    runs[0, 0], runs[0, 1] = 0, n - 1
+    top = 1
+    canvas.count[0], canvas.count[1] = 0, 0
+    while top > 0:
+        top -= 1
+        i, j = runs[top, 0], runs[top, 1]
+        if j - i < 3:
+            continue
+        a, b, q = first[i, j], second[i, j], canvas.count[1]
+        canvas.quads[q, 0], canvas.quads[q, 1] = loop[i], loop[a]
+        canvas.quads[q, 2], canvas.quads[q, 3] = loop[b], loop[j]
+        canvas.count[1] += 1
+        runs[top, 0], runs[top, 1] = i, a
+        runs[top + 1, 0], runs[top + 1, 1] = a, b
+        runs[top + 2, 0], runs[top + 2, 1] = b, j
+        top += 3
+
+
+@verb
+def _worst_drawn(canvas: Canvas, floor: float) -> float:
+    """Return the worst quality of the drawn quads, or one that is not above `floor`."""
+    worst = 1.0
+    for q in range(canvas.count[1]):
+        worst = min(worst, quad_quality(canvas.points, canvas.quads, q))
+        if worst <= floor:
+            break
+    return worst
+
+
+@inlined
+def _draw_star(canvas: Canvas, loop: Ints, n: int, turn: int) -> float:
+    """Draw a star whose centre is joined to the nodes turn, turn + 2, ...; return its worst quality."""
+    canvas.count[0], canvas.count[1] = 1, n // 2
+    o = canvas.first
+    canvas.points[o, 0], canvas.points[o, 1], reach = 0.0, 0.0, 0.0
+    for i in range(n):
+        canvas.points[o, 0] += canvas.points[loop[i], 0] / n
+        canvas.points[o, 1] += canvas.points[loop[i], 1] / n
+    for i in range(0, n, 2):
+        q = i // 2
+        canvas.quads[q, 0], canvas.quads[q, 3] = loop[(turn + i) % n], o
+        canvas.quads[q, 1], canvas.quads[q, 2] = loop[(turn + i + 1) % n], loop[(turn + i + 2) % n]
+        v = loop[i]
+        reach = max(
+            reach, np.hypot(canvas.points[v, 0] - canvas.points[o, 0], canvas.points[v, 1] - canvas.points[o, 1])
+        )
+    return _centred(canvas, reach)
+
+
+@verb
+def _centred(canvas: Canvas, reach: float) -> float:
+    """Move the drawn point to where the worst quality is best; return that."""
+    o = canvas.first
+    best, step = _worst_drawn(canvas, -1.0), 0.3 * reach
+    for _ in range(CENTRE_STEPS):
+        x, y = canvas.points[o, 0], canvas.points[o, 1]
+        best_x, best_y = x, y
+        for d in range(8):
+            angle = d * np.pi / 4
+            canvas.points[o, 0], canvas.points[o, 1] = x + step * np.cos(angle), y + step * np.sin(angle)
+            worst = _worst_drawn(canvas, best)
+            if worst > best + 1e-9:
+                best, best_x, best_y = worst, canvas.points[o, 0], canvas.points[o, 1]
+        canvas.points[o, 0], canvas.points[o, 1] = best_x, best_y
+        if best_x == x and best_y == y:
+            step *= 0.6
+    return best
+
+
+@verb
+def _grow(net: Net, cavity: Cavity, q: int, trial: int) -> bool:
+    """Make the cavity of a trial at quad q.
+
+    0 to 3: the ring of a corner; 4: the quads beside it; 5: all rings; 6 and 7: the rings of two opposite corners.
+    """
+    begin(cavity)
+    if trial < 4:
+        add_ring(net, cavity, net.quads[q, trial])
+    elif trial >= COLLAPSE:
+        add_ring(net, cavity, net.quads[q, trial - COLLAPSE])
+        add_ring(net, cavity, net.quads[q, trial - COLLAPSE + 2])
+    else:
+        add_quad(net, cavity, q)
+        for k in range(4):
+            if trial == 5:
+                add_ring(net, cavity, net.quads[q, k])
+            elif net.twins[4 * q + k] >= 0:
+                add_quad(net, cavity, net.twins[4 * q + k] >> 2)
+    return settle(net, cavity, LARGEST, ANY) and cavity.count[OUTLINE] <= LONGEST
+
+
+@verb
+def _worst_member(net: Net, cavity: Cavity) -> float:
+    worst = 1.0
+    for i in range(cavity.count[MEMBERS]):
+        worst = min(worst, quad_quality(net.points, net.quads, cavity.members[i]))
+    return worst
+
+
+@inlined
+def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) -> float:
+    """Draw the cavity with corners k and k + 2 of quad q made one node; return its worst quality."""
+    a, c = net.quads[q, k], net.quads[q, k + 2]
+    if net.rim[a] and net.rim[c]:
+        return -1.0
+    o = canvas.first
+    for i in range(2):
+        canvas.points[o, i] = 0.5 * (net.points[a, i] + net.points[c, i])
+    merged = a if net.rim[a] else (c if net.rim[c] else o)
+    canvas.count[0], canvas.count[1] = merged == o, 0
+    for i in range(cavity.count[MEMBERS]):
+        if cavity.members[i] == q:
+            continue
+        for j in range(4):
+            v = net.quads[cavity.members[i], j]
+            if v == a or v == c:
+                v = merged
+            elif cavity.leaving[v] == 0:
+                return -1.0  # another inner node would be left with two quads
+            canvas.quads[canvas.count[1], j] = v
+        canvas.count[1] += 1
+    reach = np.hypot(net.points[a, 0] - net.points[c, 0], net.points[a, 1] - net.points[c, 1])
+    return _centred(canvas, reach) if merged == o else _worst_drawn(canvas, -1.0)
+
+
+@inlined
+def _try(
+    net: Net,
+    cavity: Cavity,
+    canvas: Canvas,
+    q: int,
+    attempt: int,
+    floor: float,
+    best: Floats,
+    first: Ints,
+    second: Ints,
+) -> float:
+    """Draw a filling of a trial's outline: without a new node, or a star; return its worst quality.
+
+    A filling no better than `floor` is of no use.
+    """
+    trial, kind = attempt // 3, attempt % 3
+    n = cavity.count[OUTLINE]
+    if trial >= COLLAPSE:
+        return _draw_collapsed(net, cavity, canvas, q, trial - COLLAPSE) if kind == 0 else -1.0
+    if kind > 0:
+        return _draw_star(canvas, cavity.loop, n, kind - 1)
+    worst = _best_fill(net.points, cavity.loop, n, floor, best, first, second)
+    if worst > floor:
+        _draw_fill(canvas, cavity.loop, n, first, second)
+    return worst
+
+
+@verb
+def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
+    """Whether nodes of the outline can take all drawn quads."""
+    for i in range(cavity.count[OUTLINE]):
+        if net.valence[cavity.loop[i]] + canvas.count[1] > net.ring.shape[1]:
+            return False
+    return bool(canvas.count[1] <= net.tops[0] and canvas.count[0] <= net.tops[1])
+
+
+@kernel
+def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float, hopeless: Flags, fresh: Flags) -> int:
+    """Try to replace each quad worse than `below`; return how many cavities were filled anew.
+
+    Quads are hopeless from a vain try on, until something changes beside them.
+    """
+    best, first, second = (
+        np.empty((LONGEST, LONGEST)),
+        np.empty((LONGEST, LONGEST), np.int64),
+        np.empty((LONGEST, LONGEST), np.int64),
+    )
+    new_id = np.empty(canvas.quads.shape[0], np.int64)
+    done = 0
+    for q in range(len(net.quads)):
+        if net.quads[q, 0] < 0 or hopeless[q] or quad_quality(net.points, net.quads, q) >= below:
+            continue
+        hopeless[q] = True
+        chosen, chosen_attempt, fits, worst, enough = LEAST_GAIN, -1, False, 1.0, False
+        for turn in range(ATTEMPTS + 1):  # all attempts until one leaves nothing poor, then the best one again
+            last = enough or turn == ATTEMPTS
+            attempt = chosen_attempt if last else turn
+            if last or turn % 3 == 0:
+                fits = attempt >= 0 and _grow(net, cavity, q, attempt // 3)
+                worst = _worst_member(net, cavity) if fits else 1.0
+            if not fits:
+                if last:
+                    break
+                continue
+            quality = _try(
+                net, cavity, canvas, q, attempt, worst + (LEAST_GAIN if last else chosen), best, first, second
+            )
+            if not last:
+                if min(quality, below) - worst > chosen:
+                    chosen, chosen_attempt, enough = min(quality, below) - worst, attempt, quality >= below
+                continue
+            if _rings_have_room(net, cavity, canvas):
+                face = net.face[cavity.members[0]]
+                remove(net, cavity)
+                insert(net, canvas, new_id, face)
+                for i in range(cavity.count[OUTLINE]):
+                    v = cavity.loop[i]
+                    for j in range(net.valence[v]):
+                        hopeless[net.ring[v, j]], fresh[net.ring[v, j]] = False, True
+                done += 1
+            break
+    return done

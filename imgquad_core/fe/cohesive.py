@@ -1,0 +1,167 @@
+"""Zero-thickness elements between materials: nodes on interfaces are split, one copy for each side.
+
+::
+
+        B              3---4         4, 3 are copies of 1, 2 at the same places: the element has no
+    ---p---q---  ->    1   2  with   thickness. Its first side lies on A (the lower material), its
+        A              -------       normal points from A to B.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from imgquad_core.arrays import Ints
+from imgquad_core.errors import InputError
+
+from .femesh import FEMesh, half_edge_twins
+
+
+def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all") -> FEMesh:
+    """Return `mesh` with cohesive elements between chosen materials.
+
+    Parameters
+    ----------
+    mesh : FEMesh
+        Plane, of quads with 4, 8 or 9 nodes, not split before.
+    pairs : ``all`` or pairs of material names
+        Between which materials.
+
+    Returns
+    -------
+    FEMesh
+        `cohesive` has the elements in the order of COH2D4 in Abaqus: (1, 2) on the material of lower number, seen
+        from there from right to left, (3, 4) on the other, 4 over 1 and 3 over 2; with 8- or 9-node quads then the
+        middles of (1, 2) and (4, 3). A node is copied once for each group of elements around it that no cut parts;
+        the group with the lowest element keeps the number. So at a junction of three cut interfaces there are three
+        nodes, and where a cut ends inside a material both ends of an element are the same node. The node set of a
+        side set has the nodes of that side; `interface_B_A` gets one of its own.
+
+    Raises
+    ------
+    InputError
+        No such material, the two do not touch, or the mesh was split or extruded before.
+    """
+    if mesh.dimension == 3 or len(mesh.cohesive):
+        raise InputError(
+            "cohesive elements are put into a plane mesh once: split before extruding, all pairs at a time"
+        )
+    lower, upper = _cut_half_edges(mesh, _chosen(mesh, pairs))
+    cells, origin = _split_nodes(mesh, np.concatenate([lower, upper]), upper)
+    halves = replace(
+        mesh,
+        points=mesh.points[origin],
+        cells=cells,
+        point_kind=mesh.point_kind[origin],
+        chain_offsets=np.zeros(1, np.int64),
+        chain_points=np.empty(0, np.int64),
+    )
+    below, above = (halves.side_nodes(np.stack([h // 4, h % 4], axis=1)) for h in (lower, upper))
+    # each side runs counter-clockwise around its own element, so the two run against each other
+    columns = [below[:, 1], below[:, 0], above[:, 1], above[:, 0], *below[:, 2:].T, *above[:, 2:].T]
+    material = mesh.cell_material
+    split = replace(
+        halves,
+        cohesive=np.stack(columns, axis=1),
+        cohesive_pair=np.stack([material[lower // 4], material[upper // 4]], axis=1),
+    )
+    return replace(split, node_sets=_node_sets(split, origin))
+
+
+def open_interfaces(mesh: FEMesh) -> FEMesh:
+    """Return a split `mesh` without its cohesive elements: both sides of an interface stay, as sets, apart.
+
+    So any format and any order can hold it; for contact, and for solvers that put cohesive laws between sides.
+    """
+    return replace(mesh, cohesive=np.empty((0, 4), np.int64), cohesive_pair=np.empty((0, 2), np.int32))
+
+
+def _chosen(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]]) -> list[tuple[int, int]]:
+    """Numbers of the materials of each pair, lower first; none for all pairs."""
+    if pairs == "all":
+        return []
+    if isinstance(pairs, str):
+        raise InputError(f"cohesive pairs = '{pairs}': give 'all' or pairs of material names")
+    numbers = {name: m for m, name in mesh.material_names().items()}
+    chosen = set()
+    for pair in pairs:
+        for name in pair:
+            if name not in numbers:
+                raise InputError(f"cohesive: there is no material '{name}'; there are: {', '.join(numbers)}")
+        if len({*pair}) != 2:
+            raise InputError(f"cohesive: {pair!r} must be two materials")
+        chosen.add((min(numbers[n] for n in pair), max(numbers[n] for n in pair)))
+    if not chosen:
+        raise InputError("cohesive: no pair of materials was given")
+    return sorted(chosen)
+
+
+def _cut_half_edges(mesh: FEMesh, chosen: list[tuple[int, int]]) -> tuple[Ints, Ints]:
+    """Half-edges of chosen interfaces: of the material of lower number, ascending, and their twins."""
+    twin = half_edge_twins(mesh.cells[:, :4], mesh.n_points)
+    own, other = mesh.cell_material[np.arange(len(twin)) // 4], mesh.cell_material[twin // 4]
+    lower = np.flatnonzero((twin >= 0) & (own < other))
+    if chosen:
+        names = mesh.material_names()
+        is_chosen = np.zeros(len(lower), bool)
+        for a, b in chosen:
+            of_pair = (own[lower] == a) & (other[lower] == b)
+            if not of_pair.any():
+                raise InputError(f"cohesive: '{names[a]}' and '{names[b]}' do not touch; leave this pair out")
+            is_chosen |= of_pair
+        lower = lower[is_chosen]
+    if not len(lower):
+        raise InputError("cohesive: no two materials touch, there is nothing to split")
+    return lower, twin[lower]
+
+
+def _split_nodes(mesh: FEMesh, cut: Ints, upper: Ints) -> tuple[Ints, Ints]:
+    """Nodes of the elements after splitting along the half-edges `cut`, and the old node of each new one.
+
+    Corners of elements around a node belong together where the elements share an edge that is not cut. The middle of
+    a cut edge is copied for the `upper` side.
+    """
+    corners = mesh.cells[:, :4].ravel()
+    group = _groups_of_corners(mesh, cut)
+    first = np.full(group.max() + 1, len(group))
+    np.minimum.at(first, group, np.arange(len(group)))  # first corner of each group
+    is_cut = np.zeros(mesh.n_points, bool)
+    heads = np.roll(mesh.cells[:, :4], -1, axis=1).ravel()
+    is_cut[corners[cut]] = is_cut[heads[cut]] = True
+    keeper = np.full(mesh.n_points, len(group))  # first corner of all at each node: its group keeps the number
+    np.minimum.at(keeper, corners, np.arange(len(corners)))
+    copied = np.sort(first[is_cut[corners[first]] & (first != keeper[corners[first]])])
+    number = corners[first]
+    number[group[copied]] = mesh.n_points + np.arange(len(copied))
+    cells = mesh.cells.copy()
+    cells[:, :4] = number[group].reshape(-1, 4)
+    origin = [np.arange(mesh.n_points), corners[copied]]
+    if mesh.cells.shape[1] > 4:
+        middles = (upper // 4, 4 + upper % 4)
+        origin.append(mesh.cells[middles])
+        cells[middles] = mesh.n_points + len(copied) + np.arange(len(upper))
+    return cells, np.concatenate(origin)
+
+
+def _groups_of_corners(mesh: FEMesh, cut: Ints) -> Ints:
+    """Return the group of each corner ``4 cell + k`` of the elements."""
+    n = 4 * mesh.n_cells
+    twin = half_edge_twins(mesh.cells[:, :4], mesh.n_points)
+    twin[cut] = -1
+    tail = np.flatnonzero(twin >= 0)
+    head_of_twin = twin[tail] // 4 * 4 + (twin[tail] + 1) % 4
+    graph = coo_array((np.ones(len(tail), np.int8), (tail, head_of_twin)), shape=(n, n))
+    group: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
+    return group
+
+
+def _node_sets(mesh: FEMesh, origin: Ints) -> dict[str, Ints]:
+    """Give each side set a node set, of that side, and the others all copies of their nodes."""
+    sets = {name: np.unique(mesh.side_nodes(sides)) for name, sides in mesh.side_sets.items()}
+    others = {name: ids for name, ids in mesh.node_sets.items() if name not in sets}
+    return sets | {name: np.flatnonzero(np.isin(origin, ids)) for name, ids in others.items()}

@@ -1,0 +1,78 @@
+"""From a quad mesh to the elements that were asked for: second order, cohesive interfaces, extrusion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from imgquad_core.errors import InputError
+
+if TYPE_CHECKING:
+    from imgquad_core.model import QuadMesh
+
+    from .femesh import FEMesh
+
+
+@dataclass(frozen=True)
+class ElementOptions:
+    """Which elements a mesh is made of.
+
+    Parameters
+    ----------
+    order : int
+        1 (four nodes) or 2.
+    nodes : int
+        Nodes of a second-order quad: 8 or 9.
+    cohesive : ``all`` or pairs of names, optional
+        Between which materials interfaces are split.
+    extrude : float, optional
+        Thickness of hexes, in the unit of the mesh.
+    layers : int
+        Hexes over the thickness.
+    periodic : str, optional
+        ``x``, ``y`` or ``xy``: tie the nodes of opposite sides, of a mesh made with the same option.
+    open_interfaces : bool
+        Leave the split interfaces open: no cohesive elements between their two sides.
+    """
+
+    order: int = 1
+    nodes: int = 8
+    cohesive: str | Iterable[tuple[str, str]] | None = None
+    extrude: float | None = None
+    layers: int = 1
+    periodic: str | None = None
+    open_interfaces: bool = False
+
+    def __post_init__(self) -> None:
+        if self.order not in (1, 2):
+            raise InputError(f"order is {self.order!r}: elements of order 1 and 2 are made")
+        if self.order == 2 and self.extrude is not None:
+            raise InputError("order 2 and extrusion exclude each other: hexes have 8 nodes")
+        if self.open_interfaces and self.cohesive is None:
+            raise InputError("interfaces: sides is of split interfaces only; say which, with cohesive")
+
+    @property
+    def plain(self) -> bool:
+        """Whether these are just the quads of the mesh."""
+        return (self.order, self.cohesive, self.extrude, self.periodic) == (1, None, None, None)
+
+
+def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
+    """Return the elements of `mesh` that `options` asks for, with all sets."""
+    from .cohesive import open_interfaces, split_interfaces
+    from .extrusion import extrude
+    from .periodic_pairs import with_periodic_pairs
+    from .second_order import second_order
+    from .sets import fe_mesh
+
+    elements = fe_mesh(mesh)
+    if options.order == 2:
+        elements = second_order(elements, options.nodes)
+    if options.cohesive is not None:
+        elements = split_interfaces(elements, options.cohesive)
+    if options.periodic is not None:
+        elements = with_periodic_pairs(elements, options.periodic)
+    if options.extrude is not None:
+        elements = extrude(elements, options.extrude, options.layers)
+    return open_interfaces(elements) if options.open_interfaces else elements

@@ -1,0 +1,136 @@
+"""Sets that a solver needs, found on a quad mesh: materials, borders, interfaces, corners, junctions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.arrays import Ints
+from imgquad_core.errors import InputError
+from imgquad_core.model import PointKind, QuadMesh
+
+from .femesh import FEMesh, Names, half_edge_twins, name_materials
+
+BORDERS = ("left", "right", "bottom", "top")
+CORNERS = ("bottom_left", "bottom_right", "top_right", "top_left")
+
+
+def fe_mesh(mesh: QuadMesh) -> FEMesh:
+    """Return `mesh` with all its sets named.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+        At least one quad; quads counter-clockwise.
+
+    Returns
+    -------
+    FEMesh
+        Elements and nodes in the order of `mesh`. Sets that would be empty are not there.
+
+        ==================== ======================================== ==========================================
+        name                 sides                                    nodes
+        ==================== ======================================== ==========================================
+        left right ...       on that border of the picture            of these sides
+        interface_A_B        of A that face B                         of these sides (A before B only)
+        interface_B_A        of B that face A
+        free_A               of A where a material was dropped        of these sides
+        corner_bottom_left.. the corner of the picture, if meshed
+        junctions            where three or more boundaries meet
+        ==================== ======================================== ==========================================
+
+    Raises
+    ------
+    InputError
+        The mesh has no quads.
+    """
+    if mesh.n_quads == 0:
+        raise InputError("the mesh has no quads: nothing to write; was every material dropped?")
+    names = name_materials(mesh.quad_material, mesh.materials)
+    node_sets: dict[str, Ints] = {}
+    side_sets: dict[str, Ints] = {}
+    claimed = Names()
+    for wanted, sides, with_nodes in _named_sides(mesh, names):
+        name = claimed.claim(wanted)
+        side_sets[name] = sides
+        if with_nodes:
+            node_sets[name] = np.unique(_ends(mesh, 4 * sides[:, 0] + sides[:, 1]))
+    node_sets.update(_corner_sets(mesh, node_sets))
+    junctions = np.flatnonzero((mesh.point_kind == PointKind.JUNCTION) & (mesh.valence > 0))
+    if len(junctions):
+        node_sets["junctions"] = junctions
+    return FEMesh(
+        points=mesh.points,
+        kind="quad4",
+        cells=mesh.quads,
+        cell_material=mesh.quad_material,
+        cell_region=mesh.quad_region,
+        materials=mesh.materials,
+        node_sets=node_sets,
+        side_sets=side_sets,
+        point_kind=mesh.point_kind,
+        chain_offsets=mesh.chain_offsets,
+        chain_points=mesh.chain_points,
+    )
+
+
+def _ends(mesh: QuadMesh, half_edges: Ints) -> Ints:
+    """Tail and head of half-edges, shape (n, 2)."""
+    cell, side = half_edges // 4, half_edges % 4
+    return np.stack([mesh.quads[cell, side], mesh.quads[cell, (side + 1) % 4]], axis=1)
+
+
+def _sides(half_edges: Ints) -> Ints:
+    return np.stack([half_edges // 4, half_edges % 4], axis=1)
+
+
+def _named_sides(mesh: QuadMesh, names: dict[int, str]) -> Iterator[tuple[str, Ints, bool]]:
+    """(name, sides, are its nodes a set too) of borders, interfaces and free borders, each in a fixed order."""
+    twin = half_edge_twins(mesh.quads, mesh.n_points)
+    outer = np.flatnonzero(twin < 0)
+    border = _border_of(mesh, _ends(mesh, outer))
+    for b, name in enumerate(BORDERS):
+        if (border == b).any():
+            yield name, _sides(outer[border == b]), True
+    yield from _interfaces(mesh, twin, names)
+    free = outer[border < 0]
+    material = mesh.quad_material[free // 4]
+    for m in np.unique(material):
+        yield f"free_{names[int(m)]}", _sides(free[material == m]), True
+
+
+def _border_of(mesh: QuadMesh, ends: Ints) -> NDArray[np.int8]:
+    """Index in `BORDERS` of each border edge, -1 where the edge is not on the picture's border."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    near = 1e-9 * float((high - low).max())
+    # an edge of a dropped material may lie on the bounding box by chance: its nodes are FREE, those of a border never
+    held = (mesh.point_kind[ends] != PointKind.FREE).all(axis=1)
+    border = np.full(len(ends), -1, np.int8)
+    for b, (axis, value) in enumerate(((0, low[0]), (0, high[0]), (1, low[1]), (1, high[1]))):
+        border[held & (np.abs(mesh.points[ends, axis] - value) <= near).all(axis=1)] = b
+    return border
+
+
+def _interfaces(mesh: QuadMesh, twin: Ints, names: dict[int, str]) -> Iterator[tuple[str, Ints, bool]]:
+    inner = np.flatnonzero(twin >= 0)
+    own, other = mesh.quad_material[inner // 4], mesh.quad_material[twin[inner] // 4]
+    differ = own != other
+    pairs = np.stack([own, other], axis=1)[differ]
+    unique, of = np.unique(pairs, axis=0, return_inverse=True)
+    order = np.argsort(of.ravel(), kind="stable")
+    groups = np.split(inner[differ][order], np.cumsum(np.bincount(of.ravel(), minlength=len(unique)))[:-1])
+    for (a, b), half_edges in zip(unique, groups, strict=False):
+        yield f"interface_{names[int(a)]}_{names[int(b)]}", _sides(half_edges), bool(a < b)
+
+
+def _corner_sets(mesh: QuadMesh, node_sets: dict[str, Ints]) -> dict[str, Ints]:
+    empty = np.empty(0, np.int64)
+    corners = {}
+    for corner in CORNERS:
+        vertical, horizontal = corner.split("_")
+        both = np.intersect1d(node_sets.get(vertical, empty), node_sets.get(horizontal, empty))
+        if len(both):
+            corners[f"corner_{corner}"] = both
+    return corners

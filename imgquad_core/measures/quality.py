@@ -1,0 +1,273 @@
+"""How good a mesh is: shape of its quads, order of its nodes, area of its materials.
+
+The measures are those of Verdict and VTK: the scaled Jacobian of a quad is the least sine of its four corner angles
+(negative where a corner is concave or the quad runs clockwise); see C. J. Stimpson et al., "The Verdict Geometric
+Quality Library", SAND2007-1751.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.errors import QualityError
+from imgquad_core.geometry.halfedge import twins_of
+from imgquad_core.model import QuadMesh
+
+GOOD_ANGLES = (45.0, 135.0)  #: range of a corner's angle, in degrees, that Verdict calls acceptable
+
+
+@dataclass(frozen=True)
+class QualityReport:
+    """Figures of a mesh's shape. Angles in degrees, shares from 0 to 1.
+
+    Parameters
+    ----------
+    n_points, n_quads : int
+        Size of the mesh.
+    min_sj, sj_0_1_percent, sj_1_percent, mean_sj : float
+        Least, 0.1 % quantile, 1 % quantile and mean scaled Jacobian.
+    inverted : int
+        Quads that are concave, degenerate or clockwise: none in a valid mesh.
+    min_angle, max_angle : float
+        Of all corners.
+    good_angles : float
+        Share of quads whose angles all lie in [45, 135] degrees.
+    inner_nodes : int
+        Nodes on neither the border nor an interface.
+    irregular : float
+        Share of inner nodes that have other than four quads.
+    max_valence : int
+        Most quads at one node.
+    aspect_99_percent, max_aspect : float
+        Longest by shortest edge of a quad: 99 % quantile and maximum.
+    """
+
+    n_points: int
+    n_quads: int
+    min_sj: float
+    sj_0_1_percent: float
+    sj_1_percent: float
+    mean_sj: float
+    inverted: int
+    min_angle: float
+    max_angle: float
+    good_angles: float
+    inner_nodes: int
+    irregular: float
+    max_valence: int
+    aspect_99_percent: float
+    max_aspect: float
+
+
+class BadPlace(NamedTuple):
+    """A quad of low quality and what the picture forces there."""
+
+    quad: int  #: its id
+    x: float  #: its centre
+    y: float
+    scaled_jacobian: float
+    material: int
+    neighbours: tuple[int, ...]  #: other materials at its corners
+    sector_angle: float  #: narrowest sector of material between two boundary lines at a corner, degrees; 360 if none
+    forced: bool  #: whether no mesh of that sector could meet the limit
+
+
+def quality_report(mesh: QuadMesh) -> QualityReport:
+    """Measure `mesh`.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+        With at least one quad.
+
+    Returns
+    -------
+    QualityReport
+    """
+    sj = scaled_jacobian(mesh.points, mesh.quads)
+    angles = corner_angles(mesh.points, mesh.quads)
+    ratio = aspect(mesh.points, mesh.quads)
+    inner = inner_nodes(mesh)
+    low, high = GOOD_ANGLES
+    return QualityReport(
+        n_points=mesh.n_points,
+        n_quads=mesh.n_quads,
+        min_sj=float(sj.min()),
+        sj_0_1_percent=float(np.quantile(sj, 0.001)),
+        sj_1_percent=float(np.quantile(sj, 0.01)),
+        mean_sj=float(sj.mean()),
+        inverted=int(np.count_nonzero(sj <= 0.0)),
+        min_angle=float(angles.min()),
+        max_angle=float(angles.max()),
+        good_angles=float(((angles >= low) & (angles <= high)).all(axis=1).mean()),
+        inner_nodes=int(np.count_nonzero(inner)),
+        irregular=float(np.mean(mesh.valence[inner] != 4)) if inner.any() else 0.0,
+        max_valence=int(mesh.valence.max()),
+        aspect_99_percent=float(np.quantile(ratio, 0.99)),
+        max_aspect=float(ratio.max()),
+    )
+
+
+def scaled_jacobian(points: Floats, quads: Ints) -> Floats:
+    """Return the least sine of each quad's corner angles, shape (n_quads,); 0 where an edge has no length."""
+    cross, _, lengths = _corners(points, quads)
+    product = lengths * np.roll(lengths, 1, axis=1)
+    return np.asarray(np.divide(cross, product, out=np.zeros_like(cross), where=product > 0.0).min(axis=1))
+
+
+def corner_angles(points: Floats, quads: Ints) -> Floats:
+    """Return the angle inside each corner, in degrees from 0 to 360, shape (n_quads, 4)."""
+    cross, dot, _ = _corners(points, quads)
+    return np.asarray(np.degrees(np.arctan2(cross, dot)) % 360.0)
+
+
+def aspect(points: Floats, quads: Ints) -> Floats:
+    """Return longest by shortest edge of each quad, shape (n_quads,); infinite where an edge has no length."""
+    _, _, lengths = _corners(points, quads)
+    with np.errstate(divide="ignore"):
+        return np.asarray(lengths.max(axis=1) / lengths.min(axis=1))
+
+
+def quad_areas(points: Floats, quads: Ints) -> Floats:
+    """Return the signed area of each quad, positive if counter-clockwise, shape (n_quads,)."""
+    x, y = points[quads, 0], points[quads, 1]
+    return np.asarray(0.5 * ((x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0])))
+
+
+def region_areas(mesh: QuadMesh) -> Floats:
+    """Return the area of each region, shape (n_regions,)."""
+    areas = quad_areas(mesh.points, mesh.quads)
+    return np.asarray(np.bincount(mesh.quad_region, weights=areas, minlength=len(mesh.region_label)), float)
+
+
+def material_areas(mesh: QuadMesh) -> dict[int, float]:
+    """Return the area of each material that occurs, by number, ascending."""
+    areas = region_areas(mesh)
+    return {int(label): float(areas[mesh.region_label == label].sum()) for label in np.unique(mesh.quad_material)}
+
+
+def inner_nodes(mesh: QuadMesh) -> Flags:
+    """Tell of each node whether it is used and lies on neither the border nor an interface, shape (n_points,)."""
+    inner = mesh.valence > 0
+    inner[mesh.constraints.ravel()] = False
+    return inner
+
+
+def sectors_of(mesh: QuadMesh) -> Ints:
+    """Return the number of the sector that each corner is in, shape (n_quads, 4).
+
+    A sector is all of a node's corners that follow one another without a boundary line between them.
+    """
+    #   q's corner at v |/  h runs from v to w, its twin from w to v:
+    #     v ---- h ---> w   corner h lies left of it at v,
+    #   <---- twin -----    the corner after the twin lies right of it at v
+    twins = twins_of(mesh.quads, mesh.n_points)
+    h = np.flatnonzero((twins >= 0) & ~_on_constraint(mesh))
+    beside = twins[h] // 4 * 4 + (twins[h] + 1) % 4
+    n = 4 * mesh.n_quads
+    linked = coo_array((np.ones(len(h), bool), (h, beside)), shape=(n, n))
+    _, sector = connected_components(linked, directed=False)
+    return np.asarray(sector, np.int64).reshape(-1, 4)
+
+
+def sector_angles(mesh: QuadMesh) -> Floats:
+    """Return for each corner the angle of its sector of material between two boundary lines, shape (n_quads, 4).
+
+    It is what the boundary forces on the mesh, and 360 degrees at an inner node.
+    """
+    sector = sectors_of(mesh)
+    angles = corner_angles(mesh.points, mesh.quads)
+    return np.asarray(np.bincount(sector.ravel(), weights=angles.ravel())[sector])
+
+
+def best_sine(sector: Floats) -> Floats:
+    """Return the best scaled Jacobian that quads in sectors of the given angles (degrees) can reach."""
+    fewest = np.maximum(np.floor(sector / 90.0), 1.0)
+    sines = [np.sin(np.radians(np.minimum(sector / pieces, 180.0))) for pieces in (fewest, fewest + 1.0)]
+    return np.asarray(np.maximum(*sines))
+
+
+def forced_quads(mesh: QuadMesh, limit: float) -> Flags:
+    """Tell of each quad whether the boundary's own angle keeps it below `limit`, shape (n_quads,)."""
+    return np.asarray((best_sine(sector_angles(mesh)) < limit).any(axis=1))
+
+
+def bad_places(mesh: QuadMesh, limit: float, most: int = 10) -> list[BadPlace]:
+    """Describe the quads whose scaled Jacobian is below `limit`, worst first, at most `most`."""
+    sj = scaled_jacobian(mesh.points, mesh.quads)
+    worst = np.argsort(sj, kind="stable")[:most]
+    worst = worst[sj[worst] < limit]
+    if not len(worst):
+        return []
+    sectors = sector_angles(mesh)
+    forced = (best_sine(sectors) < limit).any(axis=1)
+    centres = mesh.points[mesh.quads[worst]].mean(axis=1)
+    return [
+        BadPlace(
+            quad=int(q),
+            x=float(centre[0]),
+            y=float(centre[1]),
+            scaled_jacobian=float(sj[q]),
+            material=int(mesh.quad_material[q]),
+            neighbours=_materials_around(mesh, int(q)),
+            sector_angle=float(sectors[q].min()),
+            forced=bool(forced[q]),
+        )
+        for q, centre in zip(worst, centres, strict=True)
+    ]
+
+
+def require_quality(mesh: QuadMesh, limit: float, most: int = 5) -> None:
+    """Raise `QualityError` where a quad's scaled Jacobian is below `limit`.
+
+    The message says how many quads are, how many of them the picture forces, and names at most `most` of the worst.
+    """
+    below = scaled_jacobian(mesh.points, mesh.quads) < limit
+    if not below.any():
+        return
+    places = bad_places(mesh, limit, most)
+    forced = int(np.count_nonzero(below & forced_quads(mesh, limit)))
+    message = (
+        f"{np.count_nonzero(below)} of {mesh.n_quads} quads have a scaled Jacobian below {limit:g}, "
+        f"{forced} of them in sectors too narrow for more; lower the limit, or the size. The worst: "
+    )
+    raise QualityError(message + "; ".join(_told(mesh, place) for place in places), mesh, [p.quad for p in places])
+
+
+def _told(mesh: QuadMesh, place: BadPlace) -> str:
+    names = " | ".join(mesh.materials.name_of(m) for m in (place.material, *place.neighbours))
+    angle = f", sector of {place.sector_angle:.1f} degrees" if place.sector_angle < 360.0 - 1e-6 else ""
+    return f"{place.scaled_jacobian:.3f} at ({place.x:.6g}, {place.y:.6g}) in {names}{angle}"
+
+
+def _corners(points: Floats, quads: Ints) -> tuple[Floats, Floats, Floats]:
+    """Return cross and dot product of the two edges at each corner, and the length of the edge that leaves it."""
+    corners = points[quads]
+    leaving = np.roll(corners, -1, axis=1) - corners
+    back = -np.roll(leaving, 1, axis=1)
+    cross = leaving[..., 0] * back[..., 1] - leaving[..., 1] * back[..., 0]
+    return cross, (leaving * back).sum(axis=2), np.hypot(leaving[..., 0], leaving[..., 1])
+
+
+def _on_constraint(mesh: QuadMesh) -> Flags:
+    """Tell of each half-edge whether it lies on a chain, shape (4 * n_quads,)."""
+    starts = mesh.quads.ravel()
+    ends = np.roll(mesh.quads, -1, axis=1).ravel()
+    a, b = mesh.constraints.T
+    return np.isin(_edge_keys(starts, ends, mesh.n_points), _edge_keys(a, b, mesh.n_points))
+
+
+def _edge_keys(a: Ints, b: Ints, n_points: int) -> Ints:
+    return np.asarray(np.minimum(a, b) * n_points + np.maximum(a, b))
+
+
+def _materials_around(mesh: QuadMesh, q: int) -> tuple[int, ...]:
+    touching = np.isin(mesh.quads, mesh.quads[q]).any(axis=1)
+    others = np.unique(mesh.quad_material[touching])
+    return tuple(int(m) for m in others if m != mesh.quad_material[q])

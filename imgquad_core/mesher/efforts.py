@@ -1,0 +1,101 @@
+"""How boundaries are filled with quads, and what an effort means."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from imgquad_core.arrays import Floats, Labels
+from imgquad_core.cleanup.irregular_nodes import CleanUp
+from imgquad_core.errors import InputError
+
+STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
+
+
+class Effort(NamedTuple):
+    """How far a mesh is optimised."""
+
+    wide: CleanUp  #: clean-up of faces on stride 4 or 6
+    narrow: CleanUp  #: clean-up of faces on stride 2
+    again_below: float  #: a face on stride 4 with a worse element is meshed on stride 2 as well
+    slides: int  #: rounds in which boundary nodes slide along their chains
+    in_nine: bool = False  #: whether very wide faces are meshed on stride 6 and their quads split in nine
+
+
+EFFORTS: Mapping[str, Effort] = {
+    "fast": Effort(CleanUp((16, 40), 0.2, 0.6), CleanUp((16,), 0.2, 0.6), 0.4, 0),
+    "normal": Effort(CleanUp((40, 160), 0.5, 0.6), CleanUp((16, 40, 80), 0.5, 0.6), 0.5, 2),
+    "best": Effort(
+        CleanUp((16, 40, 80, 160, 160), 0.8, 0.6, 160), CleanUp((16, 40, 80, 160), 1.0, 0.6, 160), 0.5, 4, True
+    ),
+}
+
+
+class Tuning(NamedTuple):
+    """Numbers of the mesher that studies settled: handed down, so that a test or the next study can ask for others."""
+
+    worst: float = 0.42  #: scaled Jacobian below which the boundary's edges at a quad are halved, if that helps
+    wishes: int = 3  #: rounds of halving for the sake of poor quads, at most
+    rounds: int = 16  #: rounds of halving in all, at most: those after the wishes are for folded quads
+    very_wide: float = 6.0  #: width of a face that is meshed on stride 6, in its coarse segments
+
+
+TUNING = Tuning()
+
+
+@dataclass(frozen=True)
+class MeshingOptions:
+    """How boundaries are filled with quads.
+
+    Parameters
+    ----------
+    size : float
+        Length of final edges inside, in pixels.
+    growth : float
+        Largest ratio of the sizes of neighbouring elements (above 1.35 it counts as 1.35 inside faces).
+    material_sizes : mapping of int to float
+        Length of final edges per material label.
+    effort : {"fast", "normal", "best"}
+        How far irregular nodes are hunted.
+    threads : int
+        Number of threads; the mesh does not depend on it.
+    tuning : Tuning
+        For tests and studies.
+    """
+
+    size: float = 4.0
+    growth: float = 1.3
+    material_sizes: Mapping[int, float] | None = field(default=None)
+    effort: str = "normal"
+    threads: int = 1
+    tuning: Tuning = TUNING
+
+    def __post_init__(self) -> None:
+        sizes = {"size": self.size} | {f"size of material {k}": v for k, v in self._sizes().items()}
+        for name, value in sizes.items():
+            if not 0.05 <= value < float("inf"):
+                raise InputError(f"{name} is {value}; give a length of at least 0.05 px")
+        if not 1.01 <= self.growth <= 10.0:
+            raise InputError(f"growth is {self.growth}; give a ratio from 1.01 to 10")
+        if self.effort not in EFFORTS:
+            raise InputError(f"effort is {self.effort!r}; give one of {', '.join(EFFORTS)}")
+        if self.threads < 1:
+            raise InputError(f"threads is {self.threads}; give at least 1")
+
+    def _sizes(self) -> Mapping[int, float]:
+        return self.material_sizes or {}
+
+    @property
+    def slope(self) -> float:
+        """Growth of the edge length per unit of length inside faces."""
+        return min(self.growth - 1.0, STEEPEST)
+
+    def face_sizes(self, labels: Labels) -> Floats:
+        """Return the edge length asked for in each face."""
+        sizes = np.full(len(labels), float(self.size))
+        for label, size in self._sizes().items():
+            sizes[labels == label] = size
+        return sizes

@@ -1,0 +1,173 @@
+"""Faces on their strides: outline, triangulate, place points, compose, split, clean up.
+
+A face is tried on the widest stride that fits it, and on the next smaller one where its worst element is poor.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imgquad_core import ahead
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.chains import halved
+from imgquad_core.cleanup.batches import batches_of, in_threads
+from imgquad_core.cleanup.faces import FaceQuads, faces_only
+from imgquad_core.cleanup.irregular_nodes import CleanUp
+from imgquad_core.errors import TopologyError
+from imgquad_core.geometry.quad_shape import lower_to_worst
+from imgquad_core.model import BoundaryGraph
+
+from .composing import compose
+from .crossfield import cross_field
+from .cutting import CutMesh, FaceConflict, cut_at_constraints
+from .efforts import EFFORTS, MeshingOptions
+from .finishing import finished
+from .frontal import frontal_points
+from .outline import Outline, chains_in_conflict, chains_of, coarse_segments, mean_edges, outline, wide_faces
+from .splitting import split_composed
+from .triangulation import Triangles, constraint_table, triangulate
+
+LEAST_WIDTH = 3.0  # of a face that is meshed on stride 4, in its coarse segments
+EVEN = 0.8  # of the size inside, mean edge around a face at stride 6: its size hardly grows from the rim inwards
+ENOUGH = 0.65  # worst element from which a face is not tried with a smaller stride
+BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
+GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, at least; groups at most
+LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
+CONTRADICTIONS = 6  # rounds in which chains are halved whose coarse outlines contradict each other
+
+
+class _Conflict(TopologyError):
+    """Outlines of these regions contradict each other at this stride."""
+
+    def __init__(self, regions: Ints) -> None:
+        super().__init__(f"the outlines of regions {regions[:10].tolist()} contradict each other")
+        self.regions = regions
+
+
+class Meshed(NamedTuple):
+    """Some faces meshed."""
+
+    parts: list[FaceQuads]
+    faces: Flags  #: which
+    worst: Floats  #: scaled Jacobian of each of them, 1 for others
+
+
+def faces_of(parts: list[FaceQuads], faces: Flags) -> list[FaceQuads]:
+    """Keep the quads of the flagged faces."""
+    return [kept for part in parts if len((kept := faces_only(part, faces)).quads)]
+
+
+def consistent(graph: BoundaryGraph, new: Flags) -> BoundaryGraph:
+    """Return the graph, with finer chains where coarse outlines of the new ones contradict each other or others."""
+    for _ in range(CONTRADICTIONS):
+        bad = chains_in_conflict(graph, coarse_segments(graph, np.ones(graph.n_chains, bool), 2), new)
+        if not bad.any():
+            flat = outline(graph, faces_beside(graph, new), 2)
+            cut = cut_at_constraints(triangulate(flat.points, flat.segments), flat.constraints)
+            if not isinstance(cut, FaceConflict):
+                return graph
+            faces = np.zeros(len(graph.region_label), bool)
+            faces[cut.regions] = True
+            bad = chains_of(graph, faces)
+        graph, new = halved(graph, bad), new | bad
+    raise TopologyError("the boundaries of the regions cross or contradict each other")
+
+
+def mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> Meshed:
+    """Mesh flagged faces on their levels."""
+    effort = EFFORTS[options.effort]
+    best = Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -np.inf))
+    if effort.in_nine:
+        even = mean_edges(graph) > EVEN * options.face_sizes(graph.region_label)
+        very_wide = todo & wide_faces(graph, 6, options.tuning.very_wide) & even
+        best = _better(best, _mesh_wide(graph, very_wide, 6, effort.wide, options))
+    wide = todo & wide_faces(graph, 4, LEAST_WIDTH) & (best.worst < ENOUGH)
+    best = _better(best, _mesh_wide(graph, wide, 4, effort.wide, options))
+    enough = np.where(_large_faces(best), min(options.tuning.worst, effort.again_below), effort.again_below)
+    return _better(best, _mesh_level(graph, todo & (best.worst < enough), 2, effort.narrow, options))
+
+
+def _better(one: Meshed, other: Meshed) -> Meshed:
+    """Take each face from where its worst element is better, the first one if none is."""
+    better = other.faces & (other.worst > one.worst)
+    parts = faces_of(one.parts, ~better) + faces_of(other.parts, better)
+    return Meshed(parts, one.faces | other.faces, np.where(better, other.worst, one.worst))
+
+
+def _large_faces(meshed: Meshed) -> Flags:
+    """Return which faces have so many quads that they are not meshed again for one that is not that bad."""
+    faces = [np.empty(0, np.int64), *(part.face for part in meshed.parts)]
+    return np.asarray(np.bincount(np.concatenate(faces), minlength=len(meshed.faces)) > LARGE)
+
+
+def _mesh_wide(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> Meshed:
+    """Mesh faces coarsely, without those whose chords contradict each other."""
+    while True:
+        try:
+            return _mesh_level(graph, faces, stride, how, options)
+        except _Conflict as conflict:
+            faces = faces.copy()
+            faces[conflict.regions] = False
+
+
+def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> Meshed:
+    """Mesh the flagged faces from segments of `stride` edges."""
+    worst = np.ones(len(faces))
+    if not faces.any():
+        return Meshed([], faces, worst)
+    groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
+    composed = in_threads(groups, lambda group: batches_of(_compose(graph, group, stride, options)), options.threads)
+    ahead.wait()
+    rim = coarse_segments(graph, chains_of(graph, faces), stride // 2)  # the Catmull-Clark split has halved edges
+    nothing = np.zeros(len(rim.tail), np.int64)
+    table = constraint_table(len(graph.points), rim.tail, rim.head, nothing, nothing, rim.middle)
+    batches = [batch for group in composed for batch in group]
+    parts = finished(batches, graph.points, stride // 2, table, how, options.threads)
+    in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.threads)
+    return Meshed(parts, faces, worst)
+
+
+def _groups_of(graph: BoundaryGraph, faces: Flags, sizes: Floats) -> list[Flags]:
+    """Return the flagged faces in groups of neighbours (by number) that threads can share, whatever their number."""
+    quads = np.where(faces, np.maximum(graph.region_pixels, 1) / sizes**2, 0.0)
+    count = int(np.clip(quads.sum() / GROUP, 1, MOST_GROUPS))
+    group = np.floor((np.cumsum(quads) - 0.5 * quads) / quads.sum() * count)
+    return [faces & (group == g) for g in np.unique(group[faces])]
+
+
+def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
+    """Triangulate faces, place points in layers, compose the triangles and split all to quads."""
+    sizes = options.face_sizes(graph.region_label) * stride
+    flat = outline(graph, faces, stride)
+    cut = _cut(triangulate(flat.points, flat.segments, BACKGROUND_AREA * float(sizes[faces].max()) ** 2), flat)
+    field = cross_field(cut, _largest_sizes(cut, sizes), options.slope)
+    points = np.vstack([flat.points, frontal_points(cut, field)])
+    cut = _cut(triangulate(points, flat.segments), flat)
+    quads = split_composed(cut, compose(cut), len(flat.ids))
+    n = len(cut.points)
+    origin = quads.origin.copy()
+    origin[:n] = np.where(origin[:n] >= 0, flat.ids[np.maximum(origin[:n], 0)], -1)
+    return quads._replace(origin=origin)
+
+
+def _cut(mesh: Triangles, flat: Outline) -> CutMesh:
+    cut = cut_at_constraints(mesh, flat.constraints)
+    if isinstance(cut, FaceConflict):
+        raise _Conflict(cut.regions)
+    return cut
+
+
+def _largest_sizes(cut: CutMesh, sizes: Floats) -> Floats:
+    """Return the size asked for at each point of a cut mesh."""
+    face = np.zeros(len(cut.points), np.int64)
+    face[cut.triangles] = cut.face[:, None]
+    return sizes[face]
+
+
+def faces_beside(graph: BoundaryGraph, chains: Flags) -> Flags:
+    """Return which faces have one of these chains on their outline."""
+    faces = np.zeros(len(graph.region_label) + 1, bool)  # VOID is the last entry
+    faces[graph.chain_regions[chains]] = True
+    return faces[:-1]

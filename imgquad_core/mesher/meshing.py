@@ -1,0 +1,125 @@
+"""From boundaries to quads: the paper's step 4, face by face on levels.
+
+Every face (region) is meshed alone; faces meet in the points of the boundary, so they fit whatever their level. A
+wide face is meshed and cleaned up with a stride of four final edges (an irregular node stays one node while nodes
+become sixteen times as many), with effort "best" a very wide one with a stride of six, others with one of two. A face
+whose worst element is poor is meshed again with the next smaller stride, and the better mesh is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from imgquad_core import ahead
+from imgquad_core.arrays import Flags, Labels
+from imgquad_core.chains import without_unused_points
+from imgquad_core.cleanup.batches import LARGEST, in_threads
+from imgquad_core.cleanup.faces import FaceQuads, joined
+from imgquad_core.cleanup.relaxation import GOOD, newton, rings_of, untangle
+from imgquad_core.cleanup.sliding import slide
+from imgquad_core.cleanup.strips import independent_nodes, strips_of
+from imgquad_core.model import BoundaryGraph, Materials, PointKind, QuadMesh
+
+from .efforts import EFFORTS, MeshingOptions
+from .levels import LEAST_WIDTH, consistent, mesh_faces
+from .outline import with_short_chains_halved
+from .refits import State, with_musts, with_wishes
+
+FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60 degrees give .866
+
+
+def mesh_boundaries(
+    graph: BoundaryGraph, options: MeshingOptions | None = None, materials: Materials | None = None
+) -> QuadMesh:
+    """Fill the regions between boundaries with quadrilaterals.
+
+    Parameters
+    ----------
+    graph : BoundaryGraph
+        From `smooth_boundaries`: chains of final edges, an even number each.
+    options : MeshingOptions, optional
+        Sizes, effort, threads.
+    materials : Materials, optional
+        Carried to the mesh; by default made of the labels.
+
+    Returns
+    -------
+    QuadMesh
+        Convex, counter-clockwise quads. The points of `graph` come first, in their order; those inside chains may
+        have slid along them, and some edges may have got a mid-point.
+
+    Raises
+    ------
+    TopologyError
+        If the chains cross.
+    """
+    ahead.start()
+    options = options or MeshingOptions()
+    graph = with_short_chains_halved(consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTH)
+    state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options))
+    state = with_musts(with_wishes(state, options), options)
+    mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
+    return _slid(mesh, EFFORTS[options.effort].slides, options.threads)
+
+
+def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
+    """Join faces at the boundary's points."""
+    graph, place = without_unused_points(graph)
+    quads = joined(parts)
+    inner = quads.origin < 0
+    ids = place[quads.origin]
+    ids[inner] = len(graph.points) + np.arange(inner.sum())
+    points = np.vstack([graph.points, quads.points[inner]])
+    kind = np.concatenate([graph.point_kind, np.full(inner.sum(), PointKind.INTERIOR, np.uint8)])
+    return QuadMesh(
+        points,
+        kind,
+        ids[quads.quads],
+        quads.face,
+        graph.region_label,
+        graph.chain_offsets,
+        graph.chain_points,
+        graph.chain_regions,
+        materials,
+    )
+
+
+def _slid(mesh: QuadMesh, rounds: int, threads: int) -> QuadMesh:
+    """Let boundary nodes slide, and the nodes inside follow."""
+    points, gone = mesh.points.copy(), np.zeros(mesh.n_points)
+    rings, (groups, seams) = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads)
+
+    def move(how: Callable[[Flags], object]) -> None:
+        in_threads(groups, how, threads)
+        how(seams)
+
+    for _ in range(rounds):
+        slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
+        move(lambda free: newton(points, rings, free, 2, GOOD))
+    move(lambda free: untangle(points, rings, free, 4, FAIR))
+    return replace(mesh, points=points)
+
+
+def _inner_nodes(mesh: QuadMesh, n_groups: int) -> tuple[list[Flags], Flags]:
+    """Return the nodes inside faces in groups that do not feel each other, and those between them.
+
+    A group has whole faces or strips of large ones, whatever the number of groups.
+    """
+    strip, n_strips = np.zeros(mesh.n_quads, np.int64), np.ones(len(mesh.region_label), np.int64)
+    for face in np.flatnonzero(np.bincount(mesh.quad_region) > 4 * LARGEST):
+        quads = np.flatnonzero(mesh.quad_region == face)
+        strip[quads] = strips_of(mesh.points, mesh.quads[quads])
+        n_strips[face] = strip[quads].max() + 1
+    piece = (np.cumsum(n_strips) - n_strips)[mesh.quad_region] + strip
+    groups, seams = independent_nodes(piece, mesh.quads, mesh.n_points, n_groups)
+    inner = mesh.point_kind == PointKind.INTERIOR
+    return [inner & group for group in groups], inner & seams
+
+
+def _materials_of(labels: Labels) -> Materials:
+    present = np.unique(labels)
+    shade = np.linspace(0, 255, len(present)).astype(np.uint8)
+    return Materials(present, tuple(f"material {m}" for m in present), np.repeat(shade[:, None], 3, axis=1))

@@ -1,0 +1,121 @@
+"""Rounds that halve the boundary's edges beside poor quads, and keep what is better."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from imgquad_core.arrays import Flags, Ints
+from imgquad_core.chains import halved, refined, with_chains_of
+from imgquad_core.errors import TopologyError
+from imgquad_core.measures.quality import scaled_jacobian
+from imgquad_core.model import BoundaryGraph
+
+from .efforts import MeshingOptions, Tuning
+from .levels import Meshed, consistent, faces_beside, faces_of, mesh_faces
+
+PATIENCE = 6  # rounds that reach no farther than the edges beside the quads
+
+
+class State(NamedTuple):
+    """All faces meshed, after some rounds."""
+
+    graph: BoundaryGraph
+    meshed: Meshed
+
+
+def with_wishes(state: State, options: MeshingOptions) -> State:
+    """Halve edges beside poor quads; what gets better by that is kept."""
+    for attempt in range(options.tuning.wishes):
+        poor = poor_rim(state.meshed, options.tuning.worst)
+        if len(poor) == 0:
+            break
+        try:
+            state = _refitted(state, _finer(state.graph, poor, attempt, options.tuning), options)
+        except TopologyError:
+            if state.meshed.worst.min(initial=1.0) <= 0.0:
+                raise
+            break  # what is there is valid
+    return state
+
+
+def with_musts(state: State, options: MeshingOptions) -> State:
+    """Halve edges beside folded quads until none is left.
+
+    Raises
+    ------
+    TopologyError
+        Quads stay folded.
+    """
+    for attempt in range(options.tuning.wishes, options.tuning.rounds):
+        folded = poor_rim(state.meshed, 0.0)
+        if len(folded) == 0:
+            break
+        state = _refitted(state, _finer(state.graph, folded, attempt, options.tuning), options)
+    if (folded := poor_rim(state.meshed, 0.0)).size:
+        where = state.graph.points[folded[0]].tolist()
+        raise TopologyError(f"{len(folded)} boundary points fold quads, the first at {where}")
+    return state
+
+
+def _refitted(state: State, finer: BoundaryGraph, options: MeshingOptions) -> State:
+    """Mesh the faces beside chains that are finer, and keep what is better, group by group of such neighbours.
+
+    Where quads fold, the new state is kept in any case.
+    """
+    graph, meshed = state
+    finer = consistent(finer, _differ(graph, finer))
+    changed = _differ(graph, finer)
+    todo = faces_beside(graph, changed)
+    done = mesh_faces(finer, todo, options)
+    group = _groups_across(graph, changed)
+    old, new = np.ones((2, len(todo)))
+    np.minimum.at(old, group, meshed.worst)
+    np.minimum.at(new, group, np.where(todo, done.worst, 1.0))
+    better = todo & ((new > old) | (old <= 0.0))[group]
+    parts = faces_of(meshed.parts, ~better) + faces_of(done.parts, better)
+    kept = changed & np.append(better, False)[graph.chain_regions].any(axis=1)
+    return State(
+        with_chains_of(graph, finer, kept),
+        Meshed(parts, meshed.faces, np.where(better, done.worst, meshed.worst)),
+    )
+
+
+def _groups_across(graph: BoundaryGraph, chains: Flags) -> Ints:
+    """Return the number of the group of each face; faces on both sides of a flagged chain are of one group."""
+    n = len(graph.region_label)
+    pairs = graph.chain_regions[chains]
+    a, b = pairs[(pairs >= 0).all(axis=1)].T
+    return np.asarray(connected_components(coo_array((np.ones(len(a)), (a, b)), (n, n)), False)[1], np.int64)
+
+
+def _finer(graph: BoundaryGraph, poor: Ints, attempt: int, tuning: Tuning) -> BoundaryGraph:
+    """Return the graph with halved edges beside points with poor quads.
+
+    A halved edge is straight, so no point there can fold a quad. With every wish, and later after some attempts, the
+    reach grows, and in the end all edges are halved: that settles it whatever the picture.
+    """
+    if attempt == tuning.rounds - 1:
+        return halved(graph, np.ones(graph.n_chains, bool))
+    return refined(graph, poor, attempt if attempt < tuning.wishes else 2 ** max(attempt - PATIENCE, 0) - 1)
+
+
+def poor_rim(meshed: Meshed, limit: float) -> Ints:
+    """Return the boundary points of quads not above `limit`, and all those of a face whose such quads have none."""
+    found = [np.empty(0, np.int64)]
+    for part in meshed.parts if (meshed.worst <= limit).any() else ():
+        looked_at = np.flatnonzero(meshed.worst[part.face] <= limit)
+        poor = looked_at[scaled_jacobian(part.points, part.quads[looked_at]) <= limit]
+        origin = part.origin[part.quads[poor]]
+        inner = np.setdiff1d(part.face[poor], part.face[poor[(origin >= 0).any(axis=1)]])
+        found += [origin.ravel(), part.origin[part.quads[np.isin(part.face, inner)]].ravel()]
+    points = np.unique(np.concatenate(found))
+    return np.asarray(points[points >= 0])
+
+
+def _differ(graph: BoundaryGraph, finer: BoundaryGraph) -> Flags:
+    """Return which chains have more points in the finer graph."""
+    return np.asarray(np.diff(finer.chain_offsets) != np.diff(graph.chain_offsets))

@@ -1,0 +1,38 @@
+"""What the second process of a first start compiles: the optimisation of quads."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def compile_last_stages() -> None:
+    """Compile the optimisation of quads, by using it on one."""
+    from imgquad_core.cleanup.faces import FaceQuads
+    from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
+    from imgquad_core.cleanup.relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, untangle
+    from imgquad_core.cleanup.sliding import slide
+    from imgquad_core.cleanup.worst_quads import repair
+    from imgquad_core.geometry.quad_shape import lower_to_worst, sector_angles
+
+    from .splitting import split_quads
+
+    points, ids = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.arange(4)
+    mesh = FaceQuads(points, ids[None, :].copy(), np.zeros(1, np.int64), ids, np.ones(4, np.int64))
+    split_quads(mesh, np.full(4, -1), np.full((4, 1), -1))
+    clean_up(mesh, CleanUp((1,), 0.0, 0.0))
+    repair(mesh, 2.0)
+    rings, none = rings_of(mesh.quads, 4), np.zeros(4, bool)
+    newton(points, rings, none, 1, GOOD)
+    kind, offsets, chain = np.zeros(4, np.uint8), np.array([0, 4]), ids.copy()
+    for values in (kind, offsets, chain):
+        values.flags.writeable = False  # as in a mesh
+    slide(points, rings, kind, offsets, chain, np.zeros(4))
+    fit_rim(points, rings, none, points, 1)
+    laplace(points, rings, none, 1)
+    untangle(points, rings, none, 1, BAD)
+    sector_angles(points, mesh.quads, none)
+    lower_to_worst(points, mesh.quads, mesh.face, np.ones(1))
+
+
+if __name__ == "__main__":
+    compile_last_stages()

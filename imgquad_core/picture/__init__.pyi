@@ -1,0 +1,25 @@
+from .noise import DenoiseOptions, Removal, automatic_limits, list_removed, remove_noise
+from .picture import Picture, picture_of
+from .reading import ReadOptions, read_picture
+from .segmentation import Segmentation, SegmentationOptions, segment_picture
+from .selection import Box, assert_solid, crop_image, drop_materials, material_number
+
+__all__ = [
+    "Box",
+    "DenoiseOptions",
+    "Picture",
+    "ReadOptions",
+    "Removal",
+    "Segmentation",
+    "SegmentationOptions",
+    "assert_solid",
+    "automatic_limits",
+    "crop_image",
+    "drop_materials",
+    "list_removed",
+    "material_number",
+    "picture_of",
+    "read_picture",
+    "remove_noise",
+    "segment_picture",
+]

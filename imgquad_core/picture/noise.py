@@ -1,0 +1,414 @@
+"""Step 1 of the paper: noise is removed, long thin features stay.
+
+A cluster is a connected set of pixels of one material. It is noise when it has fewer than `min_pixels` pixels AND its
+characteristic length is below `min_length`; both together spare veins and cracks that are thin but long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from imgquad_core.arrays import Ints, Labels
+from imgquad_core.errors import InputError
+from imgquad_core.jit import kernel, verb
+from imgquad_core.model import VOID, LabelImage
+
+from .clusters import Clusters, find, join, joined_diagonal, labelled_clusters
+
+
+@dataclass(frozen=True)
+class DenoiseOptions:
+    """What counts as noise.
+
+    Parameters
+    ----------
+    min_pixels : int
+        Clusters of this many pixels or more stay. 0 or 1: nothing is removed.
+    min_length : float
+        Clusters of this characteristic length or more stay, in pixels. 0: nothing is removed.
+    """
+
+    min_pixels: int = 0
+    min_length: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("min_pixels", self.min_pixels), ("min_length", self.min_length)):
+            if not (isfinite(value) and value >= 0):
+                raise InputError(f"{name} is {value}: give a number of pixels, 0 or more (0 switches it off)")
+        if self.min_pixels != int(self.min_pixels):
+            raise InputError(f"min_pixels is {self.min_pixels}: give a whole number of pixels")
+
+    @property
+    def removes(self) -> bool:
+        """Whether any cluster can be noise: a single pixel has the length 1."""
+        return self.min_pixels > 1 and self.min_length > 1
+
+
+@dataclass(frozen=True)
+class Removal:
+    """What noise removal took from one material.
+
+    Parameters
+    ----------
+    material : int
+        Number of the material.
+    name : str
+        Its name.
+    clusters : int
+        Clusters that were given to a neighbour.
+    pixels : int
+        Pixels of these clusters.
+    """
+
+    material: int
+    name: str
+    clusters: int
+    pixels: int
+
+
+def automatic_limits(quantised: bool, shape: tuple[int, int]) -> DenoiseOptions:
+    """Return the noise limits that suit a picture.
+
+    Parameters
+    ----------
+    quantised : bool
+        Whether the labels were found by quantising colours. Exact label pictures are taken at their word.
+    shape : tuple of int
+        (n_rows, n_cols) of the picture.
+
+    Returns
+    -------
+    DenoiseOptions
+        Off for exact labels. Otherwise `min_length` is a hundredth of the picture's shorter side, at least 4 and at
+        most 16 pixels, and `min_pixels` its square, so that a square blob of that side is the smallest that stays.
+    """
+    if not quantised:
+        return DenoiseOptions()
+    length = int(np.clip(round(min(shape) / 100), 4, 16))
+    return DenoiseOptions(min_pixels=length**2, min_length=float(length))
+
+
+def remove_noise(image: LabelImage, options: DenoiseOptions | None = None) -> LabelImage:
+    """Give each noise cluster to a neighbour, the smallest first, until none is left.
+
+    Parameters
+    ----------
+    image : LabelImage
+        Labels, int32, shape (n_rows, n_cols).
+    options : DenoiseOptions, optional
+        Limits in pixels; by default nothing is removed.
+
+    Returns
+    -------
+    LabelImage
+        New labels of the same shape with the same materials (a material may have lost all its pixels).
+
+    Notes
+    -----
+    Pixels are connected over their sides, and over a corner where the boundary stage joins them too: where the other
+    two pixels at this corner differ from them and from each other, or are a pair as well but of the commoner material
+    in the 6 x 6 window (equally common: of the higher number). A one-pixel vein is one cluster in every direction.
+
+    The characteristic length is the number of pixels on the longest of the shortest paths inside the cluster
+    (geodesic diameter, found by two breadth-first sweeps): 60 for a one-pixel vein of 60 pixels however bent, 8 for a
+    block of 8 x 8.
+
+    A cluster goes to the material with the longest common border (pixel sides; all neighbours of one material
+    count together, for they become one cluster with it). Ties: the material with the largest neighbouring cluster,
+    then the lower number. Among clusters of the same number of pixels the first in reading order goes first.
+    Merged clusters are measured anew, and labelled anew until nothing changes. `VOID` is neither noise nor a
+    neighbour, and a cluster without a neighbour stays. Time is linear in the number of pixels for given limits.
+
+    References
+    ----------
+    The paper's step 1 (doi:10.1063/2.1106101).
+    """
+    options = options or DenoiseOptions()
+    if not options.removes or image.labels.size == 0:
+        return image
+    values, colors = _ranked(image.labels)
+    while _remove_once(colors, min(int(options.min_pixels), colors.size + 1), options.min_length, len(values)):
+        pass
+    return LabelImage(_unranked(values, colors), image.materials)
+
+
+def list_removed(before: LabelImage, after: LabelImage) -> tuple[Removal, ...]:
+    """List by material what noise removal took away.
+
+    Parameters
+    ----------
+    before, after : LabelImage
+        What `remove_noise` took and gave.
+
+    Returns
+    -------
+    tuple of Removal
+        One for each material that lost pixels, in the order of their numbers.
+    """
+    if before.shape != after.shape:
+        raise InputError(f"before is {before.shape}, after is {after.shape} pixels: give the two ends of one removal")
+    if before.labels is after.labels:
+        return ()
+    changed = (before.labels != after.labels).ravel()
+    root = labelled_clusters(_ranked(before.labels)[1]).parent
+    while (root != root[root]).any():
+        root = root[root]
+    lost = before.labels.ravel()[changed]
+    # its first pixel stands for a cluster, even if that is kept: what is recoloured first may part others at a corner
+    firsts = before.labels.ravel()[np.unique(root[changed])]
+    materials, pixels = np.unique(lost, return_counts=True)
+    return tuple(
+        Removal(int(m), before.materials.name_of(int(m)), int(np.count_nonzero(firsts == m)), int(n))
+        for m, n in zip(materials, pixels, strict=True)
+    )
+
+
+class Queue(NamedTuple):
+    """Clusters by their number of pixels: those of the picture sorted once, merged ones in linked lists."""
+
+    roots: Labels
+    starts: Ints
+    merged: Labels  #: by number of pixels: a pixel in the cluster merged last, -1 for none
+    earlier: Labels  #: by pixel: the one merged before
+
+
+class Scratch(NamedTuple):
+    """Work arrays, zero between uses."""
+
+    distance: Labels  #: by pixel
+    front: Labels  #: pixels of a breadth-first sweep
+    border: Ints  #: by colour: common pixel sides
+    largest: Ints  #: by colour: pixels of the largest neighbour
+
+
+def _ranked(labels: Labels) -> tuple[Labels, Labels]:
+    """Return the materials that occur, and colours 0, 1, ... in their place (`VOID` stays)."""
+    values = _occurring(labels)
+    values = values[values != VOID]
+    if len(values) and values[-1] == len(values) - 1:
+        return values, labels.copy()
+    colors = np.searchsorted(values, labels).astype(np.int32)
+    colors[labels == VOID] = VOID
+    return values, colors
+
+
+def _occurring(labels: Labels) -> Labels:
+    low, high = (int(labels.min()), int(labels.max())) if labels.size else (0, 0)
+    if high - low > 1 << 20:
+        return np.unique(labels)
+    return (np.flatnonzero(np.bincount(labels.ravel() - low)) + low).astype(np.int32)
+
+
+def _unranked(values: Labels, colors: Labels) -> Labels:
+    return np.append(values, np.int32(VOID))[colors]  # colour -1 takes the last one
+
+
+def _remove_once(colors: Labels, min_pixels: int, min_length: float, n_colors: int) -> int:
+    """Recolour noise in place; return the number of clusters that went."""
+    clusters = labelled_clusters(colors)
+    queue = _queued(colors, clusters, min_pixels)
+    scratch = Scratch(
+        np.zeros(colors.size, np.int32),
+        np.empty(min_pixels, np.int32),
+        np.zeros(n_colors, np.int64),
+        np.zeros(n_colors, np.int64),
+    )
+    merged = np.empty(colors.size, np.int32)
+    gone = 0
+    for size in range(1, min_pixels):
+        first, last = queue.starts[size], queue.starts[size + 1]
+        roots = queue.roots[first:last]
+        if queue.merged[size] >= 0:
+            n = merged_roots(clusters, queue, size, merged)
+            roots = np.unique(np.concatenate([roots, merged[:n]]))
+        if len(roots):
+            gone += absorb_noise(colors, clusters, queue, scratch, roots, size, min_length)
+    return gone
+
+
+def _queued(colors: Labels, clusters: Clusters, min_pixels: int) -> Queue:
+    small = (clusters.parent == np.arange(colors.size)) & (clusters.pixels < min_pixels) & (colors.ravel() != VOID)
+    roots = np.flatnonzero(small).astype(np.int32)
+    order = np.argsort(clusters.pixels[roots], kind="stable")
+    starts = np.searchsorted(clusters.pixels[roots][order], np.arange(min_pixels + 1))
+    return Queue(roots[order], starts, np.full(min_pixels, -1, np.int32), np.full(colors.size, -1, np.int32))
+
+
+@kernel
+def absorb_noise(
+    colors: Labels,
+    clusters: Clusters,
+    queue: Queue,
+    scratch: Scratch,
+    roots: Labels,
+    size: int,
+    min_length: float,
+) -> int:
+    """Recolour the noise among clusters of `size` pixels; return how many went."""
+    gone = 0
+    for root in roots:
+        # an earlier one of this size may have grown into it meanwhile
+        if clusters.parent[root] != root or clusters.pixels[root] != size:
+            continue
+        color = neighbour_color(colors, clusters, scratch, root)
+        if color == VOID or characteristic_length(colors, clusters, scratch, root) >= min_length:
+            continue
+        give_away(colors, clusters, queue, root, color)
+        gone += 1
+    return gone
+
+
+@kernel
+def merged_roots(clusters: Clusters, queue: Queue, size: int, roots: Labels) -> int:
+    """Fill `roots` with the clusters that had `size` pixels when they were merged; return how many."""
+    n = 0
+    p = queue.merged[size]
+    while p >= 0:
+        roots[n] = find(clusters.parent, p)
+        n += 1
+        p = queue.earlier[p]
+    return n
+
+
+@verb
+def neighbour_color(colors: Labels, clusters: Clusters, scratch: Scratch, root: int) -> int:
+    """Return the colour with the longest border to a cluster, `VOID` where it has no neighbour."""
+    border, largest = scratch.border, scratch.largest
+    flat = colors.ravel()
+    p = root
+    while p >= 0:
+        for q in sides(p, colors.shape[0], colors.shape[1]):
+            if q >= 0 and flat[q] != flat[root] and flat[q] != VOID:
+                border[flat[q]] += 1
+                largest[flat[q]] = max(largest[flat[q]], clusters.pixels[find(clusters.parent, q)])
+        p = clusters.follower[p]
+    best = VOID
+    p = root
+    while p >= 0:
+        for q in sides(p, colors.shape[0], colors.shape[1]):
+            if q >= 0 and flat[q] != flat[root] and flat[q] != VOID:
+                if best == VOID or precedes(border, largest, flat[q], best):
+                    best = flat[q]
+        p = clusters.follower[p]
+    p = root
+    while p >= 0:
+        for q in sides(p, colors.shape[0], colors.shape[1]):
+            if q >= 0 and flat[q] != VOID:
+                border[flat[q]] = 0
+                largest[flat[q]] = 0
+        p = clusters.follower[p]
+    return best
+
+
+@verb
+def precedes(border: Ints, largest: Ints, a: int, b: int) -> bool:
+    """Return whether colour `a` is the better taker: longer border, larger neighbour, lower number."""
+    if border[a] != border[b]:
+        return bool(border[a] > border[b])
+    if largest[a] != largest[b]:
+        return bool(largest[a] > largest[b])
+    return a < b
+
+
+@kernel
+def sides(p: int, rows: int, cols: int) -> tuple[int, int, int, int]:
+    """Return the pixels above, left, right and below of pixel `p`, -1 outside."""
+    r, c = p // cols, p % cols
+    above, below = p - cols if r > 0 else -1, p + cols if r < rows - 1 else -1
+    return above, p - 1 if c > 0 else -1, p + 1 if c < cols - 1 else -1, below
+
+
+@verb
+def characteristic_length(colors: Labels, clusters: Clusters, scratch: Scratch, root: int) -> int:
+    """Return the number of pixels on the longest shortest path in a cluster, by two sweeps."""
+    if clusters.pixels[root] < 3:
+        return int(clusters.pixels[root])
+    far, _ = farthest(colors, clusters, scratch, root)
+    forget_distances(clusters, scratch, root)
+    _, length = farthest(colors, clusters, scratch, far)
+    forget_distances(clusters, scratch, root)
+    return length
+
+
+@verb
+def farthest(colors: Labels, clusters: Clusters, scratch: Scratch, start: int) -> tuple[int, int]:
+    """Return the pixel of a cluster that is the most steps from `start`, and the number of pixels on the way."""
+    distance, front = scratch.distance, scratch.front
+    rows, cols = colors.shape
+    root = find(clusters.parent, start)
+    flat = colors.ravel()
+    front[0] = start
+    distance[start] = 1
+    n, k = 1, 0
+    while k < n:
+        p = front[k]
+        r, c = p // cols, p % cols
+        for i in range(max(r - 1, 0), min(r + 2, rows)):
+            for j in range(max(c - 1, 0), min(c + 2, cols)):
+                q = i * cols + j
+                if distance[q] == 0 and flat[q] == flat[p] and find(clusters.parent, q) == root:
+                    distance[q] = distance[p] + 1
+                    front[n] = q
+                    n += 1
+        k += 1
+    return front[n - 1], distance[front[n - 1]]
+
+
+@verb
+def forget_distances(clusters: Clusters, scratch: Scratch, root: int) -> None:
+    """Set the distances of a cluster back to zero."""
+    p = root
+    while p >= 0:
+        scratch.distance[p] = 0
+        p = clusters.follower[p]
+
+
+@verb
+def give_away(colors: Labels, clusters: Clusters, queue: Queue, root: int, color: int) -> None:
+    """Recolour a cluster and unite it, and what it kept apart, with what it now touches."""
+    rows, cols = colors.shape
+    flat = colors.ravel()
+    end = clusters.last[root]
+    p = root
+    while p != -1:
+        flat[p] = color
+        p = clusters.follower[p] if p != end else -1
+    p = root
+    while p != -1:
+        # uniting appends to the list behind `end`, so the way to it stays as it was
+        following = clusters.follower[p] if p != end else -1
+        for q in sides(p, colors.shape[0], colors.shape[1]):
+            if q >= 0 and flat[q] == color:
+                merge(clusters, queue, p, q)
+        for i in range(p // cols, p // cols + 2):
+            for j in range(p % cols, p % cols + 2):
+                if 0 < i < rows and 0 < j < cols:
+                    merge_diagonal(colors, clusters, queue, i, j)
+        p = following
+
+
+@verb
+def merge_diagonal(colors: Labels, clusters: Clusters, queue: Queue, i: int, j: int) -> None:
+    """Unite the pixels that are connected over one corner."""
+    p = i * colors.shape[1] + j
+    diagonal = joined_diagonal(colors, i, j)
+    if diagonal == 1 and colors[i, j] != VOID:
+        merge(clusters, queue, p - colors.shape[1] - 1, p)
+    elif diagonal == 2 and colors[i - 1, j] != VOID:
+        merge(clusters, queue, p - colors.shape[1], p - 1)
+
+
+@kernel
+def merge(clusters: Clusters, queue: Queue, p: int, q: int) -> None:
+    """Unite two clusters and queue the result while it is small."""
+    given_up = join(clusters, p, q)
+    if given_up < 0:
+        return
+    count = clusters.pixels[find(clusters.parent, given_up)]
+    if count < len(queue.merged):
+        queue.earlier[given_up] = queue.merged[count]
+        queue.merged[count] = given_up

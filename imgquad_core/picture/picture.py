@@ -1,0 +1,117 @@
+"""A picture as it came: numbers or colours, before anything is decided about materials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from imgquad_core.arrays import Bytes, Flags
+from imgquad_core.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Values of the pixels and what the file said about them.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_rows, n_cols) or (n_rows, n_cols, 3)
+        Grey values, labels or palette indices (any integer or float type), or RGB (uint8 or uint16); row 0 on top.
+    palette : uint8, shape (n, 3), optional
+        RGB of the palette that `values` are indices of.
+    opaque : bool, shape (n_rows, n_cols), optional
+        False where the pixel is wholly transparent (alpha 0). None: all are opaque.
+    labels : bool
+        Whether `values` are material numbers for sure, however many.
+    name : str
+        What to call the picture in messages.
+    """
+
+    values: NDArray[Any]
+    palette: Bytes | None = None
+    opaque: Flags | None = None
+    labels: bool = False
+    name: str = "the array"
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_rows, n_cols)."""
+        return self.values.shape[0], self.values.shape[1]
+
+    @property
+    def is_grey(self) -> bool:
+        """Whether pixels hold one number that is no palette index."""
+        return self.values.ndim == 2 and self.palette is None
+
+
+def picture_of(array: ArrayLike, name: str = "the array") -> Picture:
+    """Take an array as a picture.
+
+    Parameters
+    ----------
+    array : array_like, shape (n_rows, n_cols) or (n_rows, n_cols, 1 to 4)
+        One channel: signed integers, bool and integers of 32 bits or more are material numbers; uint8, uint16 and
+        floats are grey values (`segment` takes them for material numbers where they are few). Two: grey and alpha.
+        Three or four: RGB and perhaps alpha; integers from 0 to 255 or 65535, floats from 0 to 1 or to 255.
+    name : str
+        What to call it in messages.
+
+    Returns
+    -------
+    Picture
+        Pixels with alpha 0 are marked as not opaque.
+
+    Raises
+    ------
+    InputError
+        For a stack, no pixels, NaN or infinity, numbers that are no colours, and types that are no numbers.
+    """
+    values = np.asarray(array)
+    if values.dtype.kind not in "biuf":
+        raise InputError(f"{name} holds values of type {values.dtype}: give integers, floats or bool")
+    if values.ndim not in (2, 3) or (values.ndim == 3 and not 1 <= values.shape[2] <= 4):
+        raise InputError(
+            f"{name} has the shape {values.shape}: give one plane, (rows, columns) or (rows, columns, 1 to 4 channels);"
+            " of a 3D stack take one slice, such as stack[10]"
+        )
+    if values.size == 0:
+        raise InputError(f"{name} has the shape {values.shape}, no pixels: give at least one")
+    _assert_finite(values, name)
+    values = values.astype(values.dtype.newbyteorder("="), copy=False)
+    channels = values.shape[2] if values.ndim == 3 else 1
+    opaque = values[..., -1] > 0 if channels in (2, 4) else None
+    if opaque is not None and opaque.all():
+        opaque = None
+    if channels >= 3:
+        return Picture(_as_rgb(values[..., :3], name), None, opaque, False, name)
+    grey = values if values.ndim == 2 else values[..., 0]
+    is_labels = grey.dtype.kind in "bi" or (grey.dtype.kind == "u" and grey.dtype.itemsize > 2)
+    return Picture(grey.astype(np.uint8) if grey.dtype.kind == "b" else grey, None, opaque, is_labels, name)
+
+
+def _assert_finite(values: NDArray[Any], name: str) -> None:
+    if values.dtype.kind != "f" or np.isfinite(values).all():
+        return
+    place = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
+    raise InputError(
+        f"{name} holds {values[place]} at row {place[0]}, column {place[1]}: replace what is not finite, for instance"
+        " by numpy.nan_to_num, or by -1 in an integer array for pixels that are not meshed"
+    )
+
+
+def _as_rgb(values: NDArray[Any], name: str) -> NDArray[Any]:
+    if values.dtype in (np.uint8, np.uint16):
+        return values
+    if values.dtype.kind == "b":
+        return values.astype(np.uint8) * np.uint8(255)
+    low, high = values.min(), values.max()
+    if low < 0 or high > (65535 if values.dtype.kind in "iu" else 255):
+        raise InputError(
+            f"colours of {name} go from {low} to {high}: give 0 to 255 (8 bit), 65535 (16 bit) or 1 (float)"
+        )
+    if values.dtype.kind == "f":
+        return np.asarray(np.rint(values * (255 if high <= 1 else 1)), np.uint8)
+    return np.asarray(values, np.uint8 if high <= 255 else np.uint16)

@@ -1,0 +1,78 @@
+"""The options of elements and solver files, as the command takes them."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from imgquad_core.errors import InputError
+from imgquad_mesh.texts import number, pair
+
+if TYPE_CHECKING:
+    from imgquad_core.fe.elements import ElementOptions
+
+#: options of the command that a writer takes under the same name
+WRITER_OPTIONS = ("analysis", "reduced", "thickness", "properties", "deck", "regions", "interfaces", "version")
+
+
+def add_element_options(parser: argparse.ArgumentParser) -> None:
+    """Add what makes an `ElementOptions` and the options of the writers."""
+    add = parser.add_argument_group("elements").add_argument
+    add("--order", type=int, choices=(1, 2), default=1, help="2: nodes in the middles of sides, on the curves")
+    add("--nodes", type=int, choices=(8, 9), default=8, help="of a quad of order 2 (default: 8)")
+    add("--cohesive", type=pair, action="append", metavar="A:B|all", help="split the interface of two materials; ...")
+    add("--extrude", type=number, metavar="THICKNESS", help="hexes of this thickness, in the unit of the mesh")
+    add("--layers", type=int, default=1, metavar="N", help="hexes over the thickness (default: 1)")
+
+    add = parser.add_argument_group("solver files").add_argument
+    add("--analysis", metavar="NAME", help="'plane stress' (default), 'plane strain', axisymmetric, heat: .inp .bdf")
+    add("--reduced", action="store_true", default=None, help="reduced integration (CPS4R ...): .inp")
+    add("--thickness", type=number, metavar="T", help="out of the plane (default: 1): .inp .bdf")
+    add("--properties", type=Path, metavar="TOML", help="values of the materials: .inp .bdf")
+    add("--deck", metavar="tension|thermal", help="a model that CalculiX runs as it is: .inp")
+    add("--regions", action="store_true", default=None, help="an element set for each connected region, too: .inp")
+    add(
+        "--interfaces",
+        choices=("elements", "springs", "sides"),
+        help="between split sides: cohesive elements, springs (.inp), or nothing, just the sides as sets",
+    )
+    add("--msh-version", dest="version_", metavar="V", help="4.1 (default) or 2.2: .msh")
+
+
+def element_options(args: argparse.Namespace) -> ElementOptions:
+    """Return the elements that `args` asks for."""
+    from imgquad_core.fe.elements import ElementOptions
+
+    pairs = args.cohesive
+    cohesive = None if pairs is None else "all" if "all" in pairs else pairs
+    periodic = None if args.periodic in (None, "none") else args.periodic
+    sides = args.interfaces == "sides"
+    return ElementOptions(args.order, args.nodes, cohesive, args.extrude, args.layers, periodic, sides)
+
+
+def writer_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of the writer that were given, checked against the format of ``args.output``.
+
+    Raises
+    ------
+    InputError
+        The format has no such option, or the file of properties cannot be used: said before any work is done.
+    """
+    from imgquad_core.fe.properties import read_properties
+    from imgquad_core.writers import WRITERS, options_of
+
+    asked = {name: getattr(args, "version_" if name == "version" else name, None) for name in WRITER_OPTIONS}
+    given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    if given.get("interfaces") == "sides":  # not the writer's, see `element_options`
+        del given["interfaces"]
+    extension = args.output.suffix.lower()
+    known = options_of(WRITERS[extension]) if extension in WRITERS else ()
+    for name in given:
+        if name not in known:
+            option = "--msh-version" if name == "version" else f"--{name}"
+            option += f" {given[name]}" if name == "interfaces" else ""
+            raise InputError(f"{extension} files have no {option}: leave it out, or write another format")
+    if "properties" in given:
+        given["properties"] = read_properties(given["properties"])
+    return given

@@ -1,0 +1,1 @@
+"""Between PyVista's datasets and the values of the core."""

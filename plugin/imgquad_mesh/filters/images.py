@@ -1,0 +1,371 @@
+"""Filters of images: their materials, without noise, boundaries, and all at once to a mesh."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import pyvista as pv
+
+from imgquad_mesh.progress import progress_of
+
+from .grids import Effort
+
+Auto: TypeAlias = Literal["auto"]
+Unit: TypeAlias = Literal["pixels", "world"]
+Policy: TypeAlias = Literal["minority", "majority", "lower", "diagonal", "junction"]
+Periodic: TypeAlias = Literal["none", "x", "y", "xy"]
+Colors: TypeAlias = "Literal['auto', 'exact'] | int | Sequence[Sequence[int]]"
+MaterialSizes: TypeAlias = "Mapping[str | int, float] | None"
+
+
+def segment(
+    image: pv.ImageData,
+    scalars: str | None = None,
+    *,
+    colors: Colors = "auto",
+    drop_transparent: bool = False,
+    progress_bar: bool = False,
+) -> pv.ImageData:
+    """Give each pixel of a flat image a material by its colour.
+
+    Parameters
+    ----------
+    image : pyvista.ImageData
+        One pixel thick, of points or cells, in any plane.
+    scalars : str, optional
+        Name of scalars to process: labels, greys, RGB or RGBA. Defaults to currently active scalars.
+    colors : "auto" | "exact" | int | sequence, default: "auto"
+        ``"exact"``: one material per distinct value. A number: quantised to that many colours. A sequence of RGB (0 to
+        255): the nearest of them. ``"auto"``: exact up to 32 colours, else quantised to a number that the histogram
+        suggests.
+    drop_transparent : bool, default: False
+        Pixels of alpha 0 get the material -1, which is not meshed.
+    progress_bar : bool, default: False
+        Display a progress bar.
+
+    Returns
+    -------
+    pyvista.ImageData
+        A copy with the array ``material`` (int32, active) and the field arrays ``material_numbers``,
+        ``material_names`` and ``material_colors``.
+
+    See Also
+    --------
+    imgquad_mesh.filters.remove_noise, imgquad_mesh.filters.mesh
+
+    Examples
+    --------
+    >>> import pyvista as pv
+    >>> image = pv.ImageData(dimensions=(60, 40, 1))
+    >>> image["grey"] = (image.points[:, 0] > 30) * 200
+    >>> image.imgquad.segment().field_data["material_numbers"]
+    pyvista_ndarray([  0, 200], dtype=int32)
+    """
+    from imgquad_core.picture.segmentation import SegmentationOptions
+    from imgquad_mesh.datasets.images import segmented, with_materials
+
+    from .parameters import checked
+
+    values = checked(colors=colors, drop_transparent=drop_transparent)
+    with progress_of(progress_bar) as begin:
+        begin("segment")
+        return with_materials(image, segmented(image, scalars, SegmentationOptions(**values)), scalars)
+
+
+def remove_noise(
+    image: pv.ImageData,
+    scalars: str | None = None,
+    *,
+    min_pixels: int | Auto = "auto",
+    min_length: float | Auto = "auto",
+    progress_bar: bool = False,
+) -> pv.ImageData:
+    """Give clusters of pixels that are both small and short to the neighbour with the longest common border.
+
+    Parameters
+    ----------
+    image : pyvista.ImageData
+        One pixel thick; segmented first where it is not yet.
+    scalars : str, optional
+        Name of scalars to process. Defaults to currently active scalars.
+    min_pixels : int | "auto", default: "auto"
+        Clusters of this many pixels or more stay. ``"auto"``: exact label images are taken at their word, in quantised
+        ones the square of `min_length`.
+    min_length : float | "auto", default: "auto"
+        Clusters of this characteristic length or more stay, in pixels, also bent ones. ``"auto"``: a hundredth of the
+        image's shorter side, from 4 to 16.
+    progress_bar : bool, default: False
+        Display a progress bar.
+
+    Returns
+    -------
+    pyvista.ImageData
+        A copy with a new array ``material``.
+    """
+    from imgquad_mesh.datasets.images import segmented, with_materials
+
+    with progress_of(progress_bar) as begin:
+        begin("denoise")
+        found = _without_noise(segmented(image, scalars), min_pixels, min_length)
+        return with_materials(image, found, scalars)
+
+
+def drop_materials(
+    image: pv.ImageData, materials: str | int | Sequence[str | int], *, scalars: str | None = None
+) -> pv.ImageData:
+    """Leave materials out: their pixels get the material -1, their boundary becomes a free border.
+
+    Parameters
+    ----------
+    image : pyvista.ImageData
+        One pixel thick; segmented first where it is not yet.
+    materials : str | int | sequence
+        Names or numbers.
+    scalars : str, optional
+        Name of scalars to process. Defaults to currently active scalars.
+
+    Returns
+    -------
+    pyvista.ImageData
+        A copy with a new array ``material``.
+    """
+    from dataclasses import replace
+
+    from imgquad_core.picture.selection import drop_materials as drop
+    from imgquad_mesh.datasets.images import segmented, with_materials
+
+    from .parameters import checked
+
+    names = [materials] if isinstance(materials, (str, int)) else materials
+    found = segmented(image, scalars)
+    chosen = checked(materials=names)["materials"]
+    return with_materials(image, replace(found, image=drop(found.image, chosen)), scalars)
+
+
+def boundaries(
+    image: pv.ImageData, scalars: str | None = None, *, policy: Policy = "minority", progress_bar: bool = False
+) -> pv.PolyData:
+    """Extract the boundaries between all materials as polylines along the sides and corners of pixels.
+
+    Parameters
+    ----------
+    image : pyvista.ImageData
+        One pixel thick; segmented first where it is not yet.
+    scalars : str, optional
+        Name of scalars to process. Defaults to currently active scalars.
+    policy : str, default: "minority"
+        What happens where two materials form a checkerboard of 2 x 2 pixels: the one with fewer pixels nearby is joined
+        (``"minority"``), the other one (``"majority"``), the one of the lower number (``"lower"``), always the same
+        diagonal (``"diagonal"``), or none (``"junction"``).
+    progress_bar : bool, default: False
+        Display a progress bar.
+
+    Returns
+    -------
+    pyvista.PolyData
+        One polyline cell for each chain between two junctions, or closed. Cell arrays ``boundary_labels`` (materials on
+        the left and right, -1 for none, as in :meth:`pyvista.ImageDataFilters.contour_labels`), ``boundary_regions``
+        and ``chain``; point array ``point_kind`` (0 inside a chain, 1 junction, 2 on the border, 3 corner).
+    """
+    from imgquad_core.boundary.extraction import ExtractionOptions
+    from imgquad_mesh.datasets.images import image_placement, segmented
+    from imgquad_mesh.datasets.lines import to_lines
+
+    from .parameters import checked
+    from .stages import extracted
+
+    options = ExtractionOptions(**checked(policy=policy))
+    with progress_of(progress_bar) as begin:
+        begin("boundary")
+        return to_lines(extracted(segmented(image, scalars).image, image_placement(image, scalars), options))
+
+
+def mesh(
+    image: pv.ImageData,
+    scalars: str | None = None,
+    *,
+    size: float = 4.0,
+    boundary_size: float | None = None,
+    material_sizes: MaterialSizes = None,
+    growth: float = 1.3,
+    colors: Colors = "auto",
+    min_pixels: int | Auto = "auto",
+    min_length: float | Auto = "auto",
+    policy: Policy = "minority",
+    edge_ratio: float = 1.2,
+    max_shift: float = 1.0,
+    drop: Sequence[str | int] = (),
+    drop_transparent: bool = False,
+    periodic: Periodic = "none",
+    effort: Effort = "normal",
+    threads: int = 1,
+    unit: Unit = "pixels",
+    sample: str | Sequence[str] = (),
+    progress_bar: bool = False,
+) -> pv.UnstructuredGrid:
+    """Mesh the materials of a flat image with quadrilaterals: all stages in one call.
+
+    Parameters
+    ----------
+    image : pyvista.ImageData
+        One pixel thick, of points or cells, in any plane, with any spacing, origin and direction.
+    scalars : str, optional
+        Name of scalars to process: material numbers, greys, or RGB(A), of points or cells. Defaults to currently
+        active scalars.
+    size : float, default: 4.0
+        Length of the final edges.
+    boundary_size : float, optional
+        The same on boundaries.
+    material_sizes : mapping, optional
+        The same in single materials, by name or number.
+    growth : float, default: 1.3
+        Largest ratio of the sizes of neighbouring elements.
+    colors : "auto" | "exact" | int | sequence, default: "auto"
+        How colours become materials, see `segment`.
+    min_pixels, min_length : float | "auto", default: "auto"
+        Clusters of fewer pixels that are also shorter (in pixels) are removed, see `remove_noise`.
+    policy : str, default: "minority"
+        Which pair is joined at an ambiguous corner of four pixels, see `boundaries`.
+    edge_ratio : float, default: 1.2
+        Largest ratio of the lengths of neighbouring edges on a boundary.
+    max_shift : float, default: 1.0
+        How far smoothing moves a boundary at most, always in pixels.
+    drop : sequence, optional
+        Materials that are left out, by name or number.
+    drop_transparent : bool, default: False
+        Leave pixels of alpha 0 out, too.
+    periodic : "none" | "x" | "y" | "xy", default: "none"
+        Opposite sides get nodes at the same places, for a periodic cell.
+    effort : "fast" | "normal" | "best", default: "normal"
+        How far the mesh is optimised.
+    threads : int, default: 1
+        Number of threads of the meshing stage; the mesh does not depend on it.
+    unit : "pixels" | "world", default: "pixels"
+        Unit of all sizes: sides of pixels (the shorter ones where they differ), or the unit of the image's spacing.
+    sample : str | sequence, optional
+        Names of arrays of the image that the cells of the mesh get too: means by area.
+    progress_bar : bool, default: False
+        Display a progress bar.
+
+    Returns
+    -------
+    pyvista.UnstructuredGrid
+        Counter-clockwise VTK_QUAD cells with the cell arrays ``material`` (int32, active) and ``region``, and the field
+        arrays ``material_numbers``, ``material_names`` and ``material_colors``. It covers the bounds that
+        :meth:`pyvista.ImageDataFilters.points_to_cells` gives the image (those of a cell image itself).
+
+    Raises
+    ------
+    imgquad_core.errors.InputError
+        The image is a stack or empty, a material does not exist, or a size cannot be met. It is a ValueError.
+    TypeError, ValueError, KeyError, pyvista.core.errors.MissingDataError
+        As PyVista's own filters raise them.
+
+    Warns
+    -----
+    UserWarning
+        Thin features force many times more quads than the area over the square of the size.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pyvista as pv
+    >>> image = pv.ImageData(dimensions=(60, 40, 1))
+    >>> image["label"] = (np.hypot(*(image.points[:, :2] - (30, 20)).T) < 12).astype(int)
+    >>> mesh = image.imgquad.mesh("label", size=3)
+    >>> mesh.bounds[:4]
+    (-0.5, 59.5, -0.5, 39.5)
+    """
+    from imgquad_core.boundary.extraction import ExtractionOptions
+    from imgquad_core.options import MeshOptions
+    from imgquad_core.picture.segmentation import SegmentationOptions
+    from imgquad_core.picture.selection import drop_materials as drop_from
+    from imgquad_core.pipeline import thin_features
+    from imgquad_mesh.datasets.grids import to_grid
+    from imgquad_mesh.datasets.images import image_placement, segmented
+
+    from .parameters import checked
+    from .stages import extracted, filled, smoothed
+
+    sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
+    values = checked(growth=growth, policy=policy, edge_ratio=edge_ratio, max_shift=max_shift, effort=effort)
+    values |= checked(threads=threads, periodic=periodic)
+    early = checked(colors=colors, drop_transparent=drop_transparent)
+    last = checked(drop=drop, sample=sample)
+    placement = image_placement(image, scalars)
+    options = MeshOptions(**_in_pixels(sizes, unit, placement.pixel_size), **values)
+    columns = _columns(image, last["sample"], scalars)
+    with progress_of(progress_bar) as begin:
+        begin("segment")
+        found = segmented(image, scalars, SegmentationOptions(**early))
+        begin("denoise")
+        labels = drop_from(_without_noise(found, min_pixels, min_length).image, last["drop"])
+        begin("boundary")
+        lines = extracted(labels, placement, ExtractionOptions(options.policy))
+        begin("smooth")
+        lines = smoothed(lines, options.smoothing(labels.materials), options.periodic)
+        begin("mesh")
+        made = filled(lines, options.meshing(labels.materials))
+    many = thin_features(labels, made, options)
+    if many:
+        warnings.warn(many, stacklevel=3)  # of the caller of the accessor's method
+    grid = to_grid(made, lines.placement)
+    _sample(grid, made, columns, lines.graph.shape)
+    return grid
+
+
+def _without_noise(found: Any, min_pixels: Any, min_length: Any) -> Any:
+    """Return a segmentation without noise, with the limits of `imgquad_core.pipeline.MeshOptions`."""
+    from dataclasses import replace
+
+    from imgquad_core.options import MeshOptions
+    from imgquad_core.picture.noise import remove_noise
+
+    from .parameters import checked
+
+    options = MeshOptions(**checked(min_pixels=min_pixels, min_length=min_length))
+    noise = options.noise(found.quantised, found.image.shape)
+    return replace(found, image=remove_noise(found.image, noise), quantised=False)
+
+
+def _in_pixels(sizes: dict[str, Any], unit: Unit, pixel_size: float) -> dict[str, Any]:
+    """Return sizes in pixels: a length, None, or lengths by material."""
+    from .parameters import checked
+
+    if checked(unit=unit)["unit"] == "pixels":
+        return sizes
+    return {
+        name: {m: length / pixel_size for m, length in value.items()} if isinstance(value, dict)
+        else None if value is None else value / pixel_size
+        for name, value in sizes.items()
+    }  # fmt: skip
+
+
+def _numbered(sizes: Mapping[str | int, float], materials: Any) -> dict[int, float]:
+    from imgquad_core.picture.selection import material_number
+
+    return {material_number(materials, name): size for name, size in sizes.items()}
+
+
+def _columns(image: pv.ImageData, names: Sequence[str], scalars: str | None) -> dict[str, Any]:
+    """Return the arrays that are to be sampled, the top row first."""
+    from imgquad_mesh.datasets.images import image_array, scalars_of
+
+    _, association = scalars_of(image, scalars)
+    for name in names:
+        if scalars_of(image, name)[1] != association:
+            raise KeyError(f"Data array ({name}) is not one of {association}s, as the scalars are: convert the image.")
+    return {name: image_array(image, name) for name in names}
+
+
+def _sample(grid: pv.UnstructuredGrid, made: Any, columns: Mapping[str, Any], shape: tuple[int, int]) -> None:
+    """Put means of arrays over each quad into a grid, in place; `made` lies on a picture of `shape` (height, width)."""
+    from imgquad_core.measures.sampling import area_means
+
+    for name, values in columns.items():
+        to_pixels = np.array(values.shape[1::-1]) / np.array(shape[::-1])
+        grid.cell_data[name] = area_means(values, made.points * to_pixels, made.quads)
+    grid.set_active_scalars("material", preference="cell")

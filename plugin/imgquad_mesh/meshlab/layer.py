@@ -1,0 +1,266 @@
+"""A layer of a MeshSet as plain arrays, and the way it travels: exactly, with its polygons.
+
+pymeshlab's constructor for polygons goes through float32 and its face attributes then crash some filters; its own PLY
+has triangles only. A binary PLY in double precision written here loads without loss: coordinates, quads and their
+order, colours, values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.arrays import Bytes, Floats, Ints, Labels
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """One mesh of a MeshSet.
+
+    Parameters
+    ----------
+    points : float64, shape (n_points, 3)
+        Coordinates.
+    face_offsets : int64, shape (n_faces + 1,)
+        Face f has the corners ``face_points[face_offsets[f]:face_offsets[f + 1]]``.
+    face_points : int64
+        Ids of points.
+    edges : int64, shape (n_edges, 2)
+        Edges of a polyline; empty for a surface.
+    face_color, point_color : uint8, shape (n, 4), optional
+        RGBA.
+    face_scalar, point_scalar : float64, shape (n,), optional
+        MeshLab's "quality".
+    material : int32, shape (n_faces,), optional
+        Material of each face.
+    label : str
+        Name of the layer.
+    """
+
+    points: Floats
+    face_offsets: Ints
+    face_points: Ints
+    edges: Ints
+    face_color: Bytes | None = None
+    point_color: Bytes | None = None
+    face_scalar: Floats | None = None
+    point_scalar: Floats | None = None
+    material: Labels | None = None
+    label: str = ""
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return len(self.face_offsets) - 1
+
+    @property
+    def face_sizes(self) -> Ints:
+        """Number of corners of each face."""
+        return np.diff(self.face_offsets)
+
+
+def surface(points: Floats, faces: NDArray[Any], **arrays: Any) -> Layer:
+    """Return a layer of faces with the same number of corners each; `points` of two or three columns."""
+    deep = np.zeros((len(points), 3))
+    deep[:, : points.shape[1]] = points
+    offsets = np.arange(len(faces) + 1, dtype=np.int64) * faces.shape[1]
+    return Layer(deep, offsets, faces.astype(np.int64).ravel(), np.empty((0, 2), np.int64), **arrays)
+
+
+def polyline(points: Floats, edges: Ints, **arrays: Any) -> Layer:
+    """Return a layer of edges; `points` of two or three columns."""
+    deep = np.zeros((len(points), 3))
+    deep[:, : points.shape[1]] = points
+    return Layer(deep, np.zeros(1, np.int64), np.empty(0, np.int64), edges.astype(np.int64), **arrays)
+
+
+def save_layer(layer: Layer, path: Path) -> None:
+    """Write the arrays of a layer into an NPZ file."""
+    arrays = {f.name: getattr(layer, f.name) for f in fields(layer)}
+    with path.open("wb") as file:
+        np.savez(file, **{name: value for name, value in arrays.items() if value is not None})
+
+
+def load_layer(path: Path) -> Layer:
+    """Read what `save_layer` wrote."""
+    with np.load(path, allow_pickle=False) as file:
+        arrays = {name: file[name] for name in file.files}
+    return Layer(**{**arrays, "label": str(arrays["label"])})
+
+
+def write_ply(layer: Layer, path: Path) -> None:
+    """Write a layer as binary PLY in double precision, polygons as they are.
+
+    Parameters
+    ----------
+    layer : Layer
+        What to write; `material` becomes an integer property of the faces that MeshLab ignores.
+    path : Path
+        The file; it is overwritten.
+    """
+    points = _point_records(layer)
+    header = ["ply", "format binary_little_endian 1.0", f"comment {_one_line(layer.label)}"]
+    header += [f"element vertex {len(points)}", *_properties(points.dtype)]
+    faces = b""
+    if layer.n_faces:
+        extra = _face_extras(layer)
+        header += [f"element face {layer.n_faces}", "property list uchar int vertex_indices", *_properties(extra.dtype)]
+        faces = _face_bytes(layer, extra)
+    if len(layer.edges):
+        header += [f"element edge {len(layer.edges)}", "property int vertex1", "property int vertex2"]
+    edges = layer.edges.astype("<i4").tobytes()
+    text = "\n".join([*header, "end_header", ""])
+    path.write_bytes(text.encode("ascii", "replace") + points.tobytes() + faces + edges)
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split()) or "imgquad-mesh"
+
+
+_PLY_TYPES = {"<f8": "double", "|u1": "uchar", "<i4": "int"}
+
+
+def _properties(dtype: np.dtype[Any]) -> list[str]:
+    names = dtype.names or ()
+    return [f"property {_PLY_TYPES[dtype[name].str]} {name}" for name in names]
+
+
+def _records(n: int, columns: dict[str, NDArray[Any]]) -> NDArray[Any]:
+    records = np.empty(n, [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()])
+    for name, values in columns.items():
+        records[name] = values
+    return records
+
+
+def _color_columns(color: Bytes | None) -> dict[str, NDArray[Any]]:
+    return {} if color is None else dict(zip(("red", "green", "blue", "alpha"), color.T, strict=True))
+
+
+def _point_records(layer: Layer) -> NDArray[Any]:
+    columns: dict[str, NDArray[Any]] = dict(zip("xyz", layer.points.T, strict=True)) | _color_columns(layer.point_color)
+    if layer.point_scalar is not None:
+        columns["quality"] = layer.point_scalar
+    return _records(len(layer.points), columns)
+
+
+def _face_extras(layer: Layer) -> NDArray[Any]:
+    columns = _color_columns(layer.face_color)
+    if layer.face_scalar is not None:
+        columns["quality"] = layer.face_scalar
+    if layer.material is not None:
+        columns["material"] = layer.material.astype(np.int32)
+    return _records(layer.n_faces, columns)
+
+
+def _face_bytes(layer: Layer, extra: NDArray[Any]) -> bytes:
+    """Return the face records: they differ in length, so those of each number of corners are put in their places."""
+    sizes = layer.face_sizes
+    lengths = 1 + 4 * sizes + extra.dtype.itemsize
+    starts = np.concatenate([[0], np.cumsum(lengths)])
+    out = np.empty(int(starts[-1]), np.uint8)
+    for size in np.unique(sizes):
+        rows = np.flatnonzero(sizes == size)
+        records = np.empty(len(rows), [("n", "u1"), ("corners", "<i4", (int(size),)), ("extra", extra.dtype)])
+        records["n"] = size
+        records["corners"] = layer.face_points[layer.face_offsets[rows, None] + np.arange(size)]
+        records["extra"] = extra[rows]
+        length = records.dtype.itemsize
+        out[starts[rows, None] + np.arange(length)] = records.view(np.uint8).reshape(len(rows), length)
+    return out.tobytes()
+
+
+def layer_of(mesh: Any) -> Layer:
+    """Take the arrays out of a ``pymeshlab.Mesh``.
+
+    Parameters
+    ----------
+    mesh : pymeshlab.Mesh
+        Made compact if it is not.
+
+    Returns
+    -------
+    Layer
+        Coordinates with the layer's transformation applied; quads in order and with their first corner first.
+    """
+    if not mesh.is_compact():
+        mesh.compact()
+    faces = _polygons(mesh)
+    offsets = np.concatenate([[0], np.cumsum([len(f) for f in faces])]).astype(np.int64)
+    corners = np.concatenate(faces).astype(np.int64) if faces else np.empty(0, np.int64)
+    first = _triangle_of_face(offsets, corners, np.asarray(mesh.face_matrix(), np.int64))
+    return Layer(
+        points=np.array(mesh.transformed_vertex_matrix()),
+        face_offsets=offsets,
+        face_points=corners,
+        edges=np.array(mesh.edge_matrix(), np.int64).reshape(-1, 2),
+        face_color=_bytes(mesh.face_color_matrix())[first] if mesh.has_face_color() and faces else None,
+        point_color=_bytes(mesh.vertex_color_matrix()) if mesh.has_vertex_color() else None,
+        face_scalar=np.array(mesh.face_scalar_array())[first] if mesh.has_face_scalar() and faces else None,
+        point_scalar=np.array(mesh.vertex_scalar_array()) if mesh.has_vertex_scalar() else None,
+        material=_material(mesh, first),
+        label=str(mesh.label()),
+    )
+
+
+def _polygons(mesh: Any) -> list[NDArray[Any]]:
+    """Return the faces; the triangles themselves where a filter left half a polygon behind."""
+    faces = mesh.polygonal_face_list()
+    if sum(len(f) for f in faces) - 2 * len(faces) != mesh.face_number():
+        return list(mesh.face_matrix())
+    return [np.roll(f, 1) if len(f) == 4 else f for f in faces]
+
+
+def _bytes(color: Any) -> Bytes:
+    return np.asarray(np.rint(np.asarray(color) * 255), np.uint8)
+
+
+def _material(mesh: Any, first: Ints) -> Labels | None:
+    try:
+        values = np.asarray(mesh.face_custom_scalar_attribute_array("material"))
+    except Exception:  # pymeshlab cannot be asked whether there is such an attribute
+        return None
+    return np.asarray(np.rint(values[first]), np.int32)
+
+
+def _triangle_of_face(offsets: Ints, corners: Ints, triangles: Ints) -> Ints:
+    """Return for each face one of the triangles that MeshLab made of it: the one with the face's first directed edge.
+
+    A quad's roll by one puts the edge (1, 2) at places (1, 2): not a diagonal of the split, whichever it is.
+    """
+    if len(triangles) == 0:
+        return np.empty(0, np.int64)
+    n = int(triangles.max()) + 1
+    keys = (triangles * n + np.roll(triangles, -1, axis=1)).ravel()
+    order = np.argsort(keys, kind="stable")
+    wanted = corners[offsets[:-1]] * n + corners[offsets[:-1] + 1]
+    at = np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)
+    return np.asarray(order[at] // 3)
+
+
+def face_of_triangle(layer: Layer, triangles: Ints) -> Ints:
+    """Return the face of `layer` that each of MeshLab's triangles belongs to: one of its edges is one of the face's.
+
+    ::
+
+        3-------2      triangles (0, 1, 2) and (0, 2, 3) of the quad share the diagonal only;
+        |     / |      each has two directed edges of the quad
+        |   /   |
+        | /     |
+        0-------1
+    """
+    if len(triangles) == 0:
+        return np.empty(0, np.int64)
+    n = len(layer.points)
+    after = np.arange(1, len(layer.face_points) + 1)
+    after[layer.face_offsets[1:] - 1] = layer.face_offsets[:-1]
+    keys = layer.face_points * n + layer.face_points[after]
+    owner = np.repeat(np.arange(layer.n_faces), layer.face_sizes)
+    order = np.argsort(keys, kind="stable")
+    wanted = triangles * n + np.roll(triangles, -1, axis=1)
+    at = np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)
+    found = keys[order][at] == wanted
+    return np.asarray(owner[order[at[np.arange(len(triangles)), np.argmax(found, axis=1)]]])

@@ -1,0 +1,195 @@
+"""Writing what a run gives: each file whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.errors import InputError
+
+if TYPE_CHECKING:
+    from imgquad_core.fe.elements import ElementOptions
+    from imgquad_core.model import LabelImage, QuadMesh
+    from imgquad_core.pipeline import Run
+
+#: formats that PyVista writes
+GRID_EXTENSIONS = (".vtu", ".vtk", ".vtkhdf")
+HDF_CHUNK = 25_000  #: values, in which VTK's HDF5 writer makes files longer
+
+
+def check_target(path: Path, extensions: tuple[str, ...]) -> None:
+    """Raise `InputError` now if `path` could not be written later."""
+    if path.suffix.lower() not in extensions:
+        raise InputError(f"{path}: cannot write '{path.suffix}' files here; the formats are {', '.join(extensions)}")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder: give the name of a file")
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write {path}: there is no folder {path.parent}; make it, or give another one")
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror or error}; give another folder") from error
+
+
+def mesh_extensions() -> tuple[str, ...]:
+    """Return the formats that a mesh can be written in."""
+    from imgquad_core.writers import WRITERS
+
+    return (*GRID_EXTENSIONS, *sorted(WRITERS))
+
+
+def write_mesh_file(mesh: QuadMesh, path: Path, elements: ElementOptions | None = None, **options: Any) -> None:
+    """Write `mesh`, as the `elements` asked for, in the format that the extension of `path` names."""
+    from imgquad_core.fe.elements import make_elements
+
+    made = make_elements(mesh, elements) if elements and not elements.plain else None
+    if path.suffix.lower() in GRID_EXTENSIONS:
+        from imgquad_mesh.datasets.grids import to_fe_grid, to_grid
+
+        grid = to_fe_grid(made) if made else to_grid(mesh)
+        replace_file(path, lambda temporary: save_dataset(grid, temporary))
+    else:
+        from imgquad_core.writers import write_mesh
+
+        write_mesh(made or mesh, path, **options)
+
+
+def write_labels(image: LabelImage, path: Path) -> None:
+    """Write the materials as meshed: int32 array in picture orientation (.npy), or a palette picture (.png)."""
+    replace_file(path, lambda temporary: _save_labels(image, temporary))
+
+
+def write_boundaries(run: Run, path: Path) -> None:
+    """Write the smoothed boundaries as polylines with the materials on their left and right."""
+    from imgquad_mesh.datasets.lines import chain_lines
+
+    graph = run.boundary
+    materials = np.append(graph.region_label, np.int32(-1))[graph.chain_regions]  # region -1 takes the last one
+    points = graph.points * run.options.pixel_size
+    lines = chain_lines(points, graph.chain_offsets, graph.chain_points, materials, graph.point_kind)
+    replace_file(path, lambda temporary: save_dataset(lines, temporary))
+
+
+def write_picture(mesh: QuadMesh, path: Path) -> None:
+    """Draw the mesh coloured by material."""
+    from .mesh_picture import draw_materials
+
+    replace_file(path, lambda temporary: draw_materials(mesh, temporary))
+
+
+def write_json(values: dict[str, Any], path: Path) -> None:
+    """Write `values` as JSON."""
+    text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def replace_file(path: Path, write: Callable[[Path], Any]) -> None:
+    """Let `write` make a new file beside `path` and move it there when it is whole.
+
+    Raises
+    ------
+    InputError
+        It cannot be written or the disk is full: what was at `path` is untouched.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix=".imgquad-", dir=path.parent) as folder:
+            temporary = Path(folder) / path.name
+            write(temporary)
+            os.replace(temporary, path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"cannot write {path}: {reason}; what was there is unchanged, free some space") from error
+
+
+def save_dataset(dataset: Any, path: Path) -> None:
+    """Save a PyVista dataset: Python writes what VTK formats, as VTK's XML writers abort the process on a full disk.
+
+    VTK's HDF5 writer does not tell that a disk is full, so room is made sure of before.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
+    writers = {".vtu": vtkXMLUnstructuredGridWriter, ".vtp": vtkXMLPolyDataWriter}
+    if path.suffix.lower() == ".vtkhdf":
+        from imgquad_core.writers.common import take_room
+
+        arrays = len(dataset.array_names) + 6  # with points, cells
+        take_room(path.parent, 1024 * dataset.GetActualMemorySize() + 8 * HDF_CHUNK * arrays)
+    if path.suffix.lower() not in writers:
+        with silent_vtk():
+            dataset.save(path)
+        return
+    writer = writers[path.suffix.lower()]()
+    writer.SetInputData(dataset)
+    writer.WriteToOutputStringOn()
+    if not writer.Write():
+        raise OSError(f"VTK cannot format {path.suffix}")
+    path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
+
+
+def read_vti(path: Path, max_pixels: int) -> NDArray[Any]:
+    """Return the picture in a file of VTK's image data, the top row first."""
+    import pyvista as pv
+    from pyvista.core.errors import MissingDataError
+
+    from imgquad_mesh.datasets.images import image_array
+
+    if not path.is_file():
+        raise InputError(f"cannot open the picture {path}: there is no such file")
+    try:
+        with silent_vtk():
+            image = pv.XMLImageDataReader(str(path)).read()
+            damaged = image.n_points == 0
+    except Exception as error:  # VTK's own texts are many lines long
+        raise InputError(f"{path} cannot be read as VTK image data: save it anew") from error
+    if damaged:
+        raise InputError(f"{path} has no pixels, or is damaged: save it anew")
+    if image.n_points > max_pixels:
+        raise InputError(f"{path} has {image.n_points} pixels, more than max_pixels = {max_pixels}: raise max_pixels")
+    try:
+        return image_array(image)
+    except (KeyError, MissingDataError) as error:
+        raise InputError(f"{path}: {error}; save it with an array of labels, greys or colours") from error
+
+
+@contextmanager
+def silent_vtk() -> Iterator[None]:
+    """Keep VTK and PyVista from printing what the errors raised here say in one line."""
+    import pyvista as pv
+
+    logging.disable(logging.CRITICAL)
+    try:
+        with pv.vtk_verbosity("off"):
+            yield
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+def _save_labels(image: LabelImage, path: Path) -> None:
+    if path.suffix.lower() == ".npy":
+        whole = BytesIO()  # np.save into a file overlooks that a disk is full
+        np.save(whole, image.labels)
+        path.write_bytes(whole.getbuffer())
+        return
+    from PIL import Image
+
+    from .mesh_picture import material_colors
+
+    numbers = image.materials.labels
+    if image.labels.min() < 0 or numbers.max(initial=0) > 254:
+        raise InputError(f"{path}: a palette picture holds the materials 0 to 254, without void; write a .npy instead")
+    palette = np.zeros((256, 3), np.uint8)
+    palette[numbers] = np.round(material_colors(image.materials) * 255)
+    picture = Image.fromarray(image.labels.astype(np.uint8), mode="P")
+    picture.putpalette(palette.ravel().tolist())
+    picture.save(path)

@@ -1,0 +1,117 @@
+"""The report of a run: everything that was chosen, removed, measured, as values that JSON holds."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, fields
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.ledger import material_ledger, region_errors
+from imgquad_core.measures.quality import bad_places, forced_quads, quality_report, scaled_jacobian
+from imgquad_core.model import BoundaryGraph, PointKind
+from imgquad_core.pipeline import thin_features
+
+if TYPE_CHECKING:
+    from imgquad_core.pipeline import Run
+
+PACKAGES = ("imgquad-mesh", "numpy", "scipy", "numba", "scikit-image", "triangle", "pyvista", "vtk")
+LOW = 0.3  #: scaled Jacobian below which Verdict calls a quad bad; counted in every report
+
+
+def build_report(
+    run: Run, image: Path, output: Path, seconds: Mapping[str, float], min_quality: float | None = None
+) -> dict[str, Any]:
+    """Return the report of `run` as nested dicts and lists of plain numbers and strings."""
+    ledger = material_ledger(run.picture, run.labels, run.boundary, run.mesh, run.options.pixel_size)
+    rows, cols = run.labels.shape
+    return {
+        "input": str(image),
+        "output": str(output),
+        "columns": cols,
+        "rows": rows,
+        "options": _options(run),
+        "notes": list(notes(run)),
+        "materials": [asdict(row) for row in ledger],
+        "removed": [asdict(removal) for removal in run.removed],
+        "counts": _counts(run),
+        "region_errors": asdict(region_errors(run.boundary)),
+        "quality": asdict(quality_report(run.mesh)) | _low_quads(run, LOW if min_quality is None else min_quality),
+        "seconds": {name: round(value, 4) for name, value in seconds.items()},
+        "peak_memory_mb": peak_memory_mb(),
+        "versions": versions(),
+    }
+
+
+def notes(run: Run) -> Iterator[str]:
+    """Say in words what was decided by itself, what was removed, and what the user may want to change."""
+    yield run.segmentation.note
+    if run.noise.removes:
+        limits = f"clusters below {run.noise.min_pixels} pixels and shorter than {run.noise.min_length:g} px"
+        removed = sum(removal.clusters for removal in run.removed)
+        yield f"noise: {removed} {limits} removed, {sum(removal.pixels for removal in run.removed)} pixels"
+    many = thin_features(run.labels, run.mesh, run.options)
+    if many:
+        yield many
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that the mesh depends on."""
+    return {"python": platform.python_version(), "platform": platform.platform()} | {
+        package: found for package in PACKAGES if (found := _version(package))
+    }
+
+
+def peak_memory_mb() -> float | None:
+    """Return the largest amount of memory that this process has used, in MB; `None` where that is not known."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(peak / (1e6 if sys.platform == "darwin" else 1e3), 1)
+
+
+def _options(run: Run) -> dict[str, Any]:
+    values = {f.name: getattr(run.options, f.name) for f in fields(run.options)}
+    used = {"min_pixels": run.noise.min_pixels, "min_length": run.noise.min_length}
+    sizes = {str(name): size for name, size in run.options.material_sizes.items()}
+    return values | used | {"material_sizes": sizes}
+
+
+def _counts(run: Run) -> dict[str, dict[str, int]]:
+    """Count regions and junctions in the picture, after noise removal, and as meshed."""
+    picture = extract_boundaries(run.picture) if run.removed or run.options.drop else run.pixel_boundary
+    graphs = {"picture": picture, "clean": run.pixel_boundary, "meshed": run.boundary}
+    return {
+        "regions": {name: len(graph.region_label) for name, graph in graphs.items()},
+        "junctions": {name: _junctions(graph) for name, graph in graphs.items()},
+    }
+
+
+def _junctions(graph: BoundaryGraph) -> int:
+    return int(np.count_nonzero(graph.point_kind == PointKind.JUNCTION))
+
+
+def _low_quads(run: Run, limit: float) -> dict[str, Any]:
+    low = scaled_jacobian(run.mesh.points, run.mesh.quads) < limit
+    forced = low & forced_quads(run.mesh, limit) if low.any() else low
+    return {
+        "limit": limit,
+        "below_limit": int(np.count_nonzero(low)),
+        "below_limit_forced": int(np.count_nonzero(forced)),
+        "worst": [place._asdict() for place in bad_places(run.mesh, limit)],
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
