@@ -107,6 +107,7 @@ class MeshOptions:
         return DenoiseOptions(
             min_pixels=auto.min_pixels if self.min_pixels == "auto" else self.min_pixels,
             min_length=auto.min_length if self.min_length == "auto" else self.min_length,
+            policy=self.policy,
         )
 
     def smoothing(self, materials: Materials | None) -> SmoothingOptions:

@@ -1,11 +1,10 @@
 from .areas import enclosed_areas
-from .extraction import POLICIES, ExtractionOptions, extract_boundaries
+from .extraction import ExtractionOptions, extract_boundaries
 from .periodic import DIRECTIONS, match_opposite_sides, rematch
 from .smoothing import SmoothingOptions, smooth_boundaries
 
 __all__ = [
     "DIRECTIONS",
-    "POLICIES",
     "ExtractionOptions",
     "SmoothingOptions",
     "enclosed_areas",

@@ -10,7 +10,7 @@ Four pixels around a pixel corner, and the sides where their colours differ (pap
     three sides   junction at the corner
     four sides    one diagonal of one colour: it is joined, two chains pass beside it
                   both diagonals: `ExtractionOptions.policy` says which is joined
-                  none: junction of four colours
+                  none: junction of four colours       (all of it: `imgquad_core.geometry.corner_rule`)
 
 Regions are labelled from the same table, so the faces between the chains are the regions by construction.
 """
@@ -24,12 +24,11 @@ import numpy as np
 
 from imgquad_core.arrays import Bytes, Floats, Ints, Labels
 from imgquad_core.errors import InputError
+from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, joined_pair, policy_code
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind
 
 OUTSIDE = -2  #: colour of what lies around the picture
-POLICIES = ("minority", "majority", "lower", "diagonal", "junction")
-_MINORITY, _MAJORITY, _LOWER, _DIAGONAL, _JUNCTION = range(5)
 # One byte for each pixel corner: bits 0-3 the sides with two colours, bits 4-5 what the chains do there,
 # bits 6-7 whether the side to the right and the side below have been traced.
 _UP, _RIGHT, _DOWN, _LEFT = 1, 2, 4, 8
@@ -55,8 +54,7 @@ class ExtractionOptions:
     policy: str = "minority"
 
     def __post_init__(self) -> None:
-        if self.policy not in POLICIES:
-            raise InputError(f"policy is {self.policy!r}; use one of {', '.join(POLICIES)}")
+        policy_code(self.policy)
 
 
 class _Chains(NamedTuple):
@@ -94,7 +92,7 @@ def extract_boundaries(image: LabelImage, options: ExtractionOptions | None = No
     labels = image.labels
     if labels.size == 0 or labels.max() < 0:
         raise InputError(f"picture of {labels.shape[0]} x {labels.shape[1]} pixels has none with a material to mesh")
-    code = _classify_corners(np.pad(labels, 1, constant_values=OUTSIDE), POLICIES.index(options.policy))
+    code = _classify_corners(np.pad(labels, 1, constant_values=OUTSIDE), policy_code(options.policy))
     starts = np.flatnonzero(code[:-1, :-1] & _DOWN)
     rows = np.searchsorted(starts, np.arange(labels.shape[0] + 1) * labels.shape[1])
     run_region, first_run = _label_runs(code, labels, starts, rows)
@@ -157,29 +155,10 @@ def _classify_corners(padded: Labels, policy: int) -> Bytes:
             if n_sides == 3 or (n_sides == 2 and (i == 0 or i == n - 1) and (j == 0 or j == m - 1)):
                 bits += _MEETS
             elif n_sides == 4:
-                bits += _resolve(padded, i, j, policy)
+                pair = joined_pair(padded, i + 1, j + 1, policy)
+                bits += _JOINS_AD if pair == PAIR_AD else (_JOINS_BC if pair == PAIR_BC else _MEETS)
             code[i, j] = bits
     return code
-
-
-@verb
-def _resolve(padded: Labels, i: int, j: int, policy: int) -> int:
-    """Choose what the chains do where all four sides have two colours."""
-    a, b = padded[i, j], padded[i, j + 1]
-    main, other = a == padded[i + 1, j + 1], b == padded[i + 1, j]
-    if policy == _JUNCTION or not (main or other):
-        return _MEETS
-    if main != other or policy == _DIAGONAL:
-        return _JOINS_AD if main else _JOINS_BC
-    n_a = n_b = 0
-    if policy != _LOWER:
-        for k in range(max(i - 2, 0), min(i + 4, padded.shape[0])):
-            for m in range(max(j - 2, 0), min(j + 4, padded.shape[1])):
-                n_a += padded[k, m] == a
-                n_b += padded[k, m] == b
-    if n_a == n_b:
-        return _JOINS_AD if a < b else _JOINS_BC
-    return _JOINS_AD if (n_a < n_b) == (policy == _MINORITY) else _JOINS_BC
 
 
 @verb

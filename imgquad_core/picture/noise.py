@@ -14,10 +14,11 @@ import numpy as np
 
 from imgquad_core.arrays import Ints, Labels
 from imgquad_core.errors import InputError
+from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, joined_pair, policy_code
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage
 
-from .clusters import Clusters, find, join, joined_diagonal, labelled_clusters
+from .clusters import Clusters, find, join, labelled_clusters
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,16 @@ class DenoiseOptions:
         Clusters of this many pixels or more stay. 0 or 1: nothing is removed.
     min_length : float
         Clusters of this characteristic length or more stay, in pixels. 0: nothing is removed.
+    policy : {"minority", "majority", "lower", "diagonal", "junction"}
+        What is connected over an ambiguous corner of four pixels: the same as in `ExtractionOptions`.
     """
 
     min_pixels: int = 0
     min_length: float = 0.0
+    policy: str = "minority"
 
     def __post_init__(self) -> None:
+        policy_code(self.policy)
         for name, value in (("min_pixels", self.min_pixels), ("min_length", self.min_length)):
             if not (isfinite(value) and value >= 0):
                 raise InputError(f"{name} is {value}: give a number of pixels, 0 or more (0 switches it off)")
@@ -109,9 +114,8 @@ def remove_noise(image: LabelImage, options: DenoiseOptions | None = None) -> La
 
     Notes
     -----
-    Pixels are connected over their sides, and over a corner where the boundary stage joins them too: where the other
-    two pixels at this corner differ from them and from each other, or are a pair as well but of the commoner material
-    in the 6 x 6 window (equally common: of the higher number). A one-pixel vein is one cluster in every direction.
+    Pixels are connected over their sides, and over a corner where the boundary stage joins them too, by
+    `imgquad_core.geometry.corner_rule`. A one-pixel vein is one cluster in every direction (not with "junction").
 
     The characteristic length is the number of pixels on the longest of the shortest paths inside the cluster
     (geodesic diameter, found by two breadth-first sweeps): 60 for a one-pixel vein of 60 pixels however bent, 8 for a
@@ -131,18 +135,20 @@ def remove_noise(image: LabelImage, options: DenoiseOptions | None = None) -> La
     if not options.removes or image.labels.size == 0:
         return image
     values, colors = _ranked(image.labels)
-    while _remove_once(colors, min(int(options.min_pixels), colors.size + 1), options.min_length, len(values)):
+    while _remove_once(colors, len(values), options):
         pass
     return LabelImage(_unranked(values, colors), image.materials)
 
 
-def list_removed(before: LabelImage, after: LabelImage) -> tuple[Removal, ...]:
+def list_removed(before: LabelImage, after: LabelImage, policy: str = "minority") -> tuple[Removal, ...]:
     """List by material what noise removal took away.
 
     Parameters
     ----------
     before, after : LabelImage
         What `remove_noise` took and gave.
+    policy : str
+        As in the options of the removal.
 
     Returns
     -------
@@ -154,7 +160,7 @@ def list_removed(before: LabelImage, after: LabelImage) -> tuple[Removal, ...]:
     if before.labels is after.labels:
         return ()
     changed = (before.labels != after.labels).ravel()
-    root = labelled_clusters(_ranked(before.labels)[1]).parent
+    root = labelled_clusters(_ranked(before.labels)[1], policy_code(policy)).parent
     while (root != root[root]).any():
         root = root[root]
     lost = before.labels.ravel()[changed]
@@ -207,9 +213,10 @@ def _unranked(values: Labels, colors: Labels) -> Labels:
     return np.append(values, np.int32(VOID))[colors]  # colour -1 takes the last one
 
 
-def _remove_once(colors: Labels, min_pixels: int, min_length: float, n_colors: int) -> int:
+def _remove_once(colors: Labels, n_colors: int, options: DenoiseOptions) -> int:
     """Recolour noise in place; return the number of clusters that went."""
-    clusters = labelled_clusters(colors)
+    min_pixels, policy = min(int(options.min_pixels), colors.size + 1), policy_code(options.policy)
+    clusters = labelled_clusters(colors, policy)
     queue = _queued(colors, clusters, min_pixels)
     scratch = Scratch(
         np.zeros(colors.size, np.int32),
@@ -226,7 +233,7 @@ def _remove_once(colors: Labels, min_pixels: int, min_length: float, n_colors: i
             n = merged_roots(clusters, queue, size, merged)
             roots = np.unique(np.concatenate([roots, merged[:n]]))
         if len(roots):
-            gone += absorb_noise(colors, clusters, queue, scratch, roots, size, min_length)
+            gone += absorb_noise(colors, clusters, queue, scratch, roots, size, options.min_length, policy)
     return gone
 
 
@@ -247,6 +254,7 @@ def absorb_noise(
     roots: Labels,
     size: int,
     min_length: float,
+    policy: int,
 ) -> int:
     """Recolour the noise among clusters of `size` pixels; return how many went."""
     gone = 0
@@ -257,7 +265,7 @@ def absorb_noise(
         color = neighbour_color(colors, clusters, scratch, root)
         if color == VOID or characteristic_length(colors, clusters, scratch, root) >= min_length:
             continue
-        give_away(colors, clusters, queue, root, color)
+        give_away(colors, clusters, queue, root, color, policy)
         gone += 1
     return gone
 
@@ -368,7 +376,7 @@ def forget_distances(clusters: Clusters, scratch: Scratch, root: int) -> None:
 
 
 @verb
-def give_away(colors: Labels, clusters: Clusters, queue: Queue, root: int, color: int) -> None:
+def give_away(colors: Labels, clusters: Clusters, queue: Queue, root: int, color: int, policy: int) -> None:
     """Recolour a cluster and unite it, and what it kept apart, with what it now touches."""
     rows, cols = colors.shape
     flat = colors.ravel()
@@ -387,18 +395,18 @@ def give_away(colors: Labels, clusters: Clusters, queue: Queue, root: int, color
         for i in range(p // cols, p // cols + 2):
             for j in range(p % cols, p % cols + 2):
                 if 0 < i < rows and 0 < j < cols:
-                    merge_diagonal(colors, clusters, queue, i, j)
+                    merge_diagonal(colors, clusters, queue, i, j, policy)
         p = following
 
 
 @verb
-def merge_diagonal(colors: Labels, clusters: Clusters, queue: Queue, i: int, j: int) -> None:
+def merge_diagonal(colors: Labels, clusters: Clusters, queue: Queue, i: int, j: int, policy: int) -> None:
     """Unite the pixels that are connected over one corner."""
     p = i * colors.shape[1] + j
-    diagonal = joined_diagonal(colors, i, j)
-    if diagonal == 1 and colors[i, j] != VOID:
+    pair = joined_pair(colors, i, j, policy)
+    if pair == PAIR_AD and colors[i, j] != VOID:
         merge(clusters, queue, p - colors.shape[1] - 1, p)
-    elif diagonal == 2 and colors[i - 1, j] != VOID:
+    elif pair == PAIR_BC and colors[i - 1, j] != VOID:
         merge(clusters, queue, p - colors.shape[1], p - 1)
 
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from imgquad_core.boundary import withdrawal
 from imgquad_core.boundary.areas import enclosed_areas, restore_areas
 from imgquad_core.boundary.curves import curves_of, per_point
-from imgquad_core.boundary.extraction import POLICIES, ExtractionOptions, extract_boundaries
+from imgquad_core.boundary.extraction import ExtractionOptions, extract_boundaries
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.errors import InputError
+from imgquad_core.geometry.corner_rule import POLICIES
 from imgquad_core.model import BoundaryGraph, PointKind
 from planar import check_meshable, check_planar
 from shapes import any_labels, disc, half_plane, label_image, spiral, square, voronoi, wedge

@@ -81,6 +81,7 @@ def remove_noise(
     *,
     min_pixels: int | Auto = "auto",
     min_length: float | Auto = "auto",
+    policy: Policy = "minority",
     progress_bar: bool = False,
 ) -> pv.ImageData:
     """Give clusters of pixels that are both small and short to the neighbour with the longest common border.
@@ -97,6 +98,8 @@ def remove_noise(
     min_length : float | "auto", default: "auto"
         Clusters of this characteristic length or more stay, in pixels, also bent ones. ``"auto"``: a hundredth of the
         image's shorter side, from 4 to 16.
+    policy : str, default: "minority"
+        What is connected at an ambiguous corner of four pixels, see `boundaries`.
     progress_bar : bool, default: False
         Display a progress bar.
 
@@ -109,7 +112,7 @@ def remove_noise(
 
     with progress_of(progress_bar) as begin:
         begin("denoise")
-        found = _without_noise(segmented(image, scalars), min_pixels, min_length)
+        found = _without_noise(segmented(image, scalars), min_pixels, min_length, policy)
         return with_materials(image, found, scalars)
 
 
@@ -302,7 +305,7 @@ def mesh(
         begin("segment")
         found = segmented(image, scalars, SegmentationOptions(**early))
         begin("denoise")
-        labels = drop_from(_without_noise(found, min_pixels, min_length).image, last["drop"])
+        labels = drop_from(_without_noise(found, min_pixels, min_length, policy).image, last["drop"])
         begin("boundary")
         lines = extracted(labels, placement, ExtractionOptions(options.policy))
         begin("smooth")
@@ -317,7 +320,7 @@ def mesh(
     return grid
 
 
-def _without_noise(found: Any, min_pixels: Any, min_length: Any) -> Any:
+def _without_noise(found: Any, min_pixels: Any, min_length: Any, policy: Any) -> Any:
     """Return a segmentation without noise, with the limits of `imgquad_core.pipeline.MeshOptions`."""
     from dataclasses import replace
 
@@ -326,7 +329,7 @@ def _without_noise(found: Any, min_pixels: Any, min_length: Any) -> Any:
 
     from .parameters import checked
 
-    options = MeshOptions(**checked(min_pixels=min_pixels, min_length=min_length))
+    options = MeshOptions(**checked(min_pixels=min_pixels, min_length=min_length, policy=policy))
     noise = options.noise(found.quantised, found.image.shape)
     return replace(found, image=remove_noise(found.image, noise), quantised=False)
 

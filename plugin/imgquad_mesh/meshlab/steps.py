@@ -126,7 +126,7 @@ def _remove_noise(state: State, options: DenoiseOptions) -> dict[str, Any]:
     before = _labels(state)
     after = remove_noise(before, options)
     state.put_labels(after)
-    removed = list_removed(before, after)
+    removed = list_removed(before, after, options.policy)
     return {"removed_clusters": sum(r.clusters for r in removed), "removed_pixels": sum(r.pixels for r in removed)}
 
 
