@@ -13,6 +13,8 @@ star; or the poor quad is collapsed:
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
@@ -42,9 +44,25 @@ LONGEST = 16  # nodes of an outline
 LEAST_GAIN = 0.02  # of the worst scaled Jacobian
 ANY = 99  # quads that a node of the outline may need: valences do not count here
 ROUNDS = 3
-COLLAPSE = 6  # the first of two trials that collapse the quad
-ATTEMPTS = 3 * (COLLAPSE + 2)  # three fillings of each trial's outline
+COLLAPSE = 6  # the first of the two cavities in which the quad is collapsed
+CAVITIES = COLLAPSE + 2  # that are tried around a quad, see `_grow`
+FILLINGS = 3  # of an outline: without a new node, or a star on its even or on its odd nodes
 CENTRE_STEPS = 8
+
+
+class Tables(NamedTuple):
+    """Dynamic programming over an outline: for the nodes i to j of it, the best filling and how it begins."""
+
+    quality: Floats  #: (n, n) worst scaled Jacobian
+    first: Ints  #: (n, n) the node a of the quad i a b j
+    second: Ints  #: (n, n) the node b
+
+
+class Choice(NamedTuple):
+    """Which cavity is filled in which way; -1 for none."""
+
+    cavity: int
+    filling: int
 
 
 def repair(mesh: FaceQuads, below: float) -> tuple[FaceQuads, Flags]:
@@ -68,11 +86,12 @@ def repair(mesh: FaceQuads, below: float) -> tuple[FaceQuads, Flags]:
 
 
 @verb
-def _best_fill(points: Floats, loop: Ints, n: int, floor: float, best: Floats, first: Ints, second: Ints) -> float:
+def _best_fill(points: Floats, loop: Ints, n: int, floor: float, tables: Tables) -> float:
     """Fill the tables of the best quads for each run of an outline; return the worst quality of the best filling.
 
     Only fillings better than `floor` count; -2 where there is none.
     """
+    best, first, second = tables.quality, tables.first, tables.second
     corners = np.empty((1, 4), np.int64)
     for i in range(n - 1):
         best[i, i + 1] = 1.0
@@ -93,7 +112,7 @@ def _best_fill(points: Floats, loop: Ints, n: int, floor: float, best: Floats, f
 
 
 @verb
-def _draw_fill(canvas: Canvas, loop: Ints, n: int, first: Ints, second: Ints) -> None:
+def _draw_fill(canvas: Canvas, loop: Ints, n: int, tables: Tables) -> None:
     """Draw the quads that the tables tell."""
     runs = np.empty((2 * n, 2), np.int64)
     runs[0, 0], runs[0, 1] = 0, n - 1
@@ -104,7 +123,7 @@ def _draw_fill(canvas: Canvas, loop: Ints, n: int, first: Ints, second: Ints) ->
         i, j = runs[top, 0], runs[top, 1]
         if j - i < 3:
             continue
-        a, b, q = first[i, j], second[i, j], canvas.count[1]
+        a, b, q = tables.first[i, j], tables.second[i, j], canvas.count[1]
         canvas.quads[q, 0], canvas.quads[q, 1] = loop[i], loop[a]
         canvas.quads[q, 2], canvas.quads[q, 3] = loop[b], loop[j]
         canvas.count[1] += 1
@@ -167,7 +186,7 @@ def _centred(canvas: Canvas, reach: float) -> float:
 
 @verb
 def _grow(net: Net, cavity: Cavity, q: int, trial: int) -> bool:
-    """Make the cavity of a trial at quad q.
+    """Make one of the cavities at quad q; return whether its outline can be filled.
 
     0 to 3: the ring of a corner; 4: the quads beside it; 5: all rings; 6 and 7: the rings of two opposite corners.
     """
@@ -221,31 +240,20 @@ def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) ->
     return _centred(canvas, reach) if merged == o else _worst_drawn(canvas, -1.0)
 
 
-@inlined
-def _try(
-    net: Net,
-    cavity: Cavity,
-    canvas: Canvas,
-    q: int,
-    attempt: int,
-    floor: float,
-    best: Floats,
-    first: Ints,
-    second: Ints,
-) -> float:
-    """Draw a filling of a trial's outline: without a new node, or a star; return its worst quality.
+@verb
+def _draw(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, choice: Choice, floor: float) -> float:
+    """Draw a filling of the cavity's outline; return its worst quality.
 
     A filling no better than `floor` is of no use.
     """
-    trial, kind = attempt // 3, attempt % 3
     n = cavity.count[OUTLINE]
-    if trial >= COLLAPSE:
-        return _draw_collapsed(net, cavity, canvas, q, trial - COLLAPSE) if kind == 0 else -1.0
-    if kind > 0:
-        return _draw_star(canvas, cavity.loop, n, kind - 1)
-    worst = _best_fill(net.points, cavity.loop, n, floor, best, first, second)
+    if choice.cavity >= COLLAPSE:
+        return _draw_collapsed(net, cavity, canvas, q, choice.cavity - COLLAPSE) if choice.filling == 0 else -1.0
+    if choice.filling > 0:
+        return _draw_star(canvas, cavity.loop, n, choice.filling - 1)
+    worst = _best_fill(net.points, cavity.loop, n, floor, tables)
     if worst > floor:
-        _draw_fill(canvas, cavity.loop, n, first, second)
+        _draw_fill(canvas, cavity.loop, n, tables)
     return worst
 
 
@@ -258,13 +266,51 @@ def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
     return bool(canvas.count[1] <= net.tops[0] and canvas.count[0] <= net.tops[1])
 
 
+@inlined
+def _find(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, below: float) -> Choice:
+    """Choose what makes the surroundings of quad q best; the first that leaves nothing below `below` is enough."""
+    gain, best = LEAST_GAIN, Choice(-1, -1)
+    for trial in range(CAVITIES):
+        if not _grow(net, cavity, q, trial):
+            continue
+        worst = _worst_member(net, cavity)
+        for filling in range(FILLINGS):
+            choice = Choice(trial, filling)
+            quality = _draw(net, cavity, canvas, tables, q, choice, worst + gain)
+            if min(quality, below) - worst > gain:
+                gain, best = min(quality, below) - worst, choice
+                if quality >= below:
+                    return best
+    return best
+
+
+@inlined
+def _redraw(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, choice: Choice) -> bool:
+    """Draw the choice once more; return whether the nodes of the outline can take it."""
+    _grow(net, cavity, q, choice.cavity)
+    _draw(net, cavity, canvas, tables, q, choice, _worst_member(net, cavity) + LEAST_GAIN)
+    return _rings_have_room(net, cavity, canvas)
+
+
+@inlined
+def _fill(net: Net, cavity: Cavity, canvas: Canvas, new_id: Ints, hopeless: Flags, fresh: Flags) -> None:
+    """Put what is drawn in the place of the cavity; what lies beside it is worth a try again."""
+    face = net.face[cavity.members[0]]
+    remove(net, cavity)
+    insert(net, canvas, new_id, face)
+    for i in range(cavity.count[OUTLINE]):
+        v = cavity.loop[i]
+        for j in range(net.valence[v]):
+            hopeless[net.ring[v, j]], fresh[net.ring[v, j]] = False, True
+
+
 @kernel
 def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float, hopeless: Flags, fresh: Flags) -> int:
     """Try to replace each quad worse than `below`; return how many cavities were filled anew.
 
     Quads are hopeless from a vain try on, until something changes beside them.
     """
-    best, first, second = (
+    tables = Tables(
         np.empty((LONGEST, LONGEST)),
         np.empty((LONGEST, LONGEST), np.int64),
         np.empty((LONGEST, LONGEST), np.int64),
@@ -275,32 +321,8 @@ def _repair_pass(net: Net, cavity: Cavity, canvas: Canvas, below: float, hopeles
         if net.quads[q, 0] < 0 or hopeless[q] or quad_quality(net.points, net.quads, q) >= below:
             continue
         hopeless[q] = True
-        chosen, chosen_attempt, fits, worst, enough = LEAST_GAIN, -1, False, 1.0, False
-        for turn in range(ATTEMPTS + 1):  # all attempts until one leaves nothing poor, then the best one again
-            last = enough or turn == ATTEMPTS
-            attempt = chosen_attempt if last else turn
-            if last or turn % 3 == 0:
-                fits = attempt >= 0 and _grow(net, cavity, q, attempt // 3)
-                worst = _worst_member(net, cavity) if fits else 1.0
-            if not fits:
-                if last:
-                    break
-                continue
-            quality = _try(
-                net, cavity, canvas, q, attempt, worst + (LEAST_GAIN if last else chosen), best, first, second
-            )
-            if not last:
-                if min(quality, below) - worst > chosen:
-                    chosen, chosen_attempt, enough = min(quality, below) - worst, attempt, quality >= below
-                continue
-            if _rings_have_room(net, cavity, canvas):
-                face = net.face[cavity.members[0]]
-                remove(net, cavity)
-                insert(net, canvas, new_id, face)
-                for i in range(cavity.count[OUTLINE]):
-                    v = cavity.loop[i]
-                    for j in range(net.valence[v]):
-                        hopeless[net.ring[v, j]], fresh[net.ring[v, j]] = False, True
-                done += 1
-            break
+        choice = _find(net, cavity, canvas, tables, q, below)
+        if choice.cavity >= 0 and _redraw(net, cavity, canvas, tables, q, choice):
+            _fill(net, cavity, canvas, new_id, hopeless, fresh)
+            done += 1
     return done
