@@ -22,8 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from ccx import solve
-from handmade import disk, staircase
 from imgquad_core.fe.femesh import FEMesh
 from imgquad_core.fe.second_order import second_order
 from imgquad_core.fe.sets import fe_mesh
@@ -31,6 +29,8 @@ from imgquad_core.model import QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import mesh_image
 from imgquad_core.writers import write_mesh
+from support.ccx import solve
+from support.handmade import disk, staircase
 
 Floats = NDArray[np.float64]
 #: clean label pictures, and the size that keeps CalculiX within a minute each

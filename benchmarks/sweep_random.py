@@ -24,8 +24,8 @@ from imgquad_core.mesher.efforts import EFFORTS
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import QuadMesh
 from imgquad_core.options import MeshOptions
-from invariants import assert_valid_mesh
-from shapes import KINDS, Labels, label_image, labels_of_kind
+from support.invariants import assert_valid_mesh
+from support.labels import KINDS, Labels, label_image, labels_of_kind
 
 SIZES = (1.0, 2.5, 6.0)
 STAGES = ("boundaries", "mesh", "check")

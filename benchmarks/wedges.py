@@ -20,7 +20,7 @@ from imgquad_core.boundary.smoothing import smooth_boundaries
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.options import MeshOptions
-from shapes import label_image, wedge
+from support.labels import label_image, wedge
 
 ANGLES = (15, 20, 30, 40, 45, 50, 60, 70, 80, 90)  # degrees
 SIZES = (2.0, 3.0, 4.0)  # in turn

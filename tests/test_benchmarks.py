@@ -13,8 +13,8 @@ from growth import exponent
 from imgquad_core import MeshOptions, QuadMesh, mesh_image
 from imgquad_core.measures.quality import quad_areas
 from run import PARTS, replaced
-from shapes import voronoi
-from test_docs import DOCS
+from support import ROOT
+from support.labels import voronoi
 
 
 def length(mesh: QuadMesh) -> float:
@@ -61,7 +61,7 @@ def test_exponent_of_a_power_is_its_exponent() -> None:
 
 
 def test_the_page_has_a_place_for_each_part() -> None:
-    page = (DOCS / "benchmarks.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
     for part in PARTS:
         before, after = (replaced(page, part, text) for text in ("one", "other"))
         assert "\none\n" in before

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import runpy
-from pathlib import Path
 
 import pyvista as pv
 
 from imgquad_mesh.spec import filters
+from support import ROOT
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = ROOT / "docs"
 PAGE = runpy.run_path(str(DOCS / "filter_reference.py"))
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 import pyvista as pv
 
-from pictures import need_renderer
+from support import ROOT
+from support.images import need_renderer
 
-EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("plot_*.py"))
+EXAMPLES = sorted((ROOT / "examples").glob("plot_*.py"))
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])

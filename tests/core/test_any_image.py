@@ -14,8 +14,8 @@ from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.mesher.efforts import EFFORTS, MeshingOptions
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import VOID, LabelImage, QuadMesh
-from invariants import assert_valid_mesh
-from shapes import KINDS, Labels, label_image, labels_of_kind, spiral, voronoi
+from support.invariants import assert_valid_mesh
+from support.labels import KINDS, Labels, label_image, labels_of_kind, spiral, voronoi
 
 SIZES = (1.0, 2.5, 6.0)
 N_COLORS = 8

@@ -19,8 +19,8 @@ from imgquad_core.model import VOID, LabelImage, Materials
 from imgquad_core.options import MeshOptions
 from imgquad_core.picture.selection import crop_image, drop_materials, material_number
 from imgquad_core.pipeline import STAGES, mesh_image, run, thin_features
-from invariants import assert_valid_mesh
-from shapes import wedge
+from support.invariants import assert_valid_mesh
+from support.labels import wedge
 
 Labels = NDArray[np.int32]
 

@@ -7,11 +7,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from handmade import disk, jiggle, round_inclusion, staircase
 from imgquad_core.errors import InputError
 from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import VOID, PointKind, QuadMesh
 from imgquad_core.tracing import trace_mesh
+from support.handmade import disk, jiggle, round_inclusion, staircase
 
 PICTURE = disk(12, 4)
 PICTURE[:, 9:] = 2

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ccx import needs_ccx, solve
-from handmade import disk, jiggle, jiggle_beside, round_inclusion, staircase
 from imgquad_core.fe.second_order import second_order
 from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import VOID
 from imgquad_core.writers import write_mesh
+from support.ccx import needs_ccx, solve
+from support.handmade import disk, jiggle, jiggle_beside, round_inclusion, staircase
 
 pytestmark = needs_ccx
 DISK = staircase(disk(12, 4), ("matrix", "disk"), jiggle)

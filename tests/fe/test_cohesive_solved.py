@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ccx import needs_ccx, solve
-from handmade import jiggle_beside, round_inclusion, staircase
 from imgquad_core.fe.cohesive import split_interfaces
 from imgquad_core.fe.femesh import FEMesh
 from imgquad_core.fe.second_order import second_order
@@ -17,6 +15,8 @@ from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import mesh_image
 from imgquad_core.writers import write_mesh
+from support.ccx import needs_ccx, solve
+from support.handmade import jiggle_beside, round_inclusion, staircase
 
 pytestmark = needs_ccx
 

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ccx import needs_ccx
-from handmade import disk, round_inclusion, staircase
+import fe_figures
 from imgquad_core.fe.second_order import second_order
 from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import mesh_image
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-import fe_figures
+from support.ccx import needs_ccx
+from support.handmade import disk, round_inclusion, staircase
 
 pytest.importorskip("skfem")
 

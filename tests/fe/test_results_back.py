@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ccx import needs_ccx
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
+from support import ROOT
+from support.ccx import needs_ccx
 
 
 @needs_ccx
-def test_the_example_solves_a_rock_and_draws_its_stress(tmp_path: Path) -> None:
+def test_the_example_solves_a_rock_and_draws_its_stress(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pv = pytest.importorskip("pyvista")
     pytest.importorskip("pyvista_frd", reason="pip install pyvista-frd-reader")
     pytest.importorskip("matplotlib")
+    monkeypatch.syspath_prepend(ROOT / "examples")
     import stress_on_a_micrograph
 
     stress_on_a_micrograph.main(tmp_path)

@@ -12,7 +12,7 @@ import pytest
 import pyvista as pv
 
 from imgquad_mesh import filters
-from pictures import point_image
+from support.images import point_image
 
 
 def test_methods_are_the_functions_with_their_help() -> None:

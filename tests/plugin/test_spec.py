@@ -18,8 +18,8 @@ from imgquad_core.errors import InputError
 from imgquad_mesh.meshlab.steps import STEPS
 from imgquad_mesh.spec import Filter, filters, filters_file, find_filter, python_name, read_filters
 from imgquad_mesh.texts import TEXTS, options_from, values_of
+from support import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 XML = (ROOT / "filters.xml").read_text(encoding="utf-8")
 
 #: first words of the names of pymeshlab's 281 filters

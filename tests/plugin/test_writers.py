@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from handmade import disk, jiggle, round_inclusion, staircase
 from imgquad_core.errors import InputError
 from imgquad_core.fe.elements import ElementOptions, make_elements
 from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 from imgquad_mesh.datasets.grids import from_grid, to_fe_grid, to_grid
+from support.handmade import disk, jiggle, round_inclusion, staircase
 
 MESH = staircase(disk(10, 3), ("matrix", "disk"), jiggle)
 

@@ -1,0 +1,409 @@
+"""From boundaries to quads: valid, sized as told, every effort, the same bytes each time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
+from imgquad_core.cleanup import batches
+from imgquad_core.errors import InputError, TopologyError
+from imgquad_core.measures.quality import quality_report
+from imgquad_core.mesher import levels, meshing, refits
+from imgquad_core.mesher.efforts import EFFORTS, MeshingOptions, Tuning
+from imgquad_core.mesher.meshing import mesh_boundaries
+from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind, QuadMesh
+from support import naive
+from support.faces import Points, graph_of, polygon_graph, voronoi_graph
+from support.invariants import assert_valid_mesh
+from support.labels import Labels, disc, label_image, voronoi
+
+ARRAYS = ("points", "point_kind", "quads", "quad_region", "chain_offsets", "chain_points", "chain_regions")
+
+
+def boundaries(image: LabelImage, size: float, **more: Any) -> BoundaryGraph:
+    return smooth_boundaries(extract_boundaries(image), SmoothingOptions(size=size, **more))
+
+
+def meshed(labels: Labels, size: float, sizes: dict[int, float] | None = None, **more: Any) -> QuadMesh:
+    """Mesh a picture and check that the mesh is valid."""
+    image = label_image(labels)
+    graph = boundaries(image, size, material_sizes=sizes)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=size, material_sizes=sizes, **more), image.materials)
+    assert_valid_mesh(mesh, image)
+    return mesh
+
+
+def same(one: QuadMesh, two: QuadMesh) -> bool:
+    return all(getattr(one, name).tobytes() == getattr(two, name).tobytes() for name in ARRAYS)
+
+
+def edge_lengths(mesh: QuadMesh, quads: Any = slice(None)) -> Points:
+    p = mesh.points[mesh.quads[quads]]
+    lengths: Points = np.hypot(*(np.roll(p, -1, axis=1) - p).transpose(2, 0, 1))
+    return lengths
+
+
+def irregular_share(mesh: QuadMesh) -> float:
+    inner = mesh.point_kind == PointKind.INTERIOR
+    return float((mesh.valence[inner] != 4).mean())
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("size", [1.5, 4.0])
+def test_grains_give_a_valid_mesh_with_every_effort(effort: str, size: float) -> None:
+    mesh = meshed(voronoi(80, 60, 7, 4), size, effort=effort)
+    quality = naive.corner_sines(mesh.points, mesh.quads).min(axis=1)
+    assert quality.min() > 0.2
+    assert quality.mean() > 0.9
+
+
+def test_more_effort_leaves_fewer_irregular_nodes() -> None:
+    graph = voronoi_graph(128, 3, 2.0, 0)
+    share = {e: irregular_share(mesh_boundaries(graph, MeshingOptions(size=2.0, effort=e))) for e in EFFORTS}
+    assert share["best"] < share["normal"] < share["fast"] < 0.05
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("seed", range(2))
+def test_boundary_points_keep_their_ids_and_only_those_inside_chains_slide(seed: int, effort: str) -> None:
+    graph = voronoi_graph(64, 3, 2.0, seed, bend=0.03)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=2.0, effort=effort))
+    n = len(graph.points)
+    assert np.array_equal(mesh.point_kind[:n], graph.point_kind)
+    assert np.array_equal(mesh.chain_regions, graph.chain_regions)
+    assert np.array_equal(mesh.region_label, graph.region_label)
+    stays = np.isin(graph.point_kind, [PointKind.JUNCTION, PointKind.CORNER])
+    assert mesh.points[:n][stays].tobytes() == graph.points[stays].tobytes()
+    pairs = np.sort(np.stack([mesh.quads.ravel(), np.roll(mesh.quads, -1, axis=1).ravel()], axis=1), axis=1)
+    assert set(map(tuple, np.sort(mesh.constraints, axis=1).tolist())) <= set(map(tuple, pairs.tolist()))
+    for c in range(graph.n_chains):
+        old = graph.chain(c)
+        new = mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]
+        assert np.array_equal(new[new < n], old)
+        assert len(new) == len(old) or len(old) == 3, "a smooth chain gets no more edges, if it has more than two"
+        way = np.hypot(*(mesh.points[old[1:-1]] - graph.points[old[1:-1]]).T)
+        edge = np.hypot(*np.diff(graph.points[old], axis=0).T)
+        assert (way <= (0.35 if effort != "fast" else 0.0) * np.maximum(edge[:-1], edge[1:])).all()
+
+
+@pytest.mark.parametrize("size", [2.0, 5.0])
+def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None:
+    graph = boundaries(label_image(np.random.default_rng(1).integers(0, 3, (40, 40))), size)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=size, effort="fast"))
+    assert mesh.points[: len(graph.points)].tobytes() == graph.points.tobytes()
+    assert naive.worst_quality(mesh.points, mesh.quads) > Tuning().worst
+
+
+@pytest.mark.parametrize("rounds", [1, Tuning().rounds])
+def test_edges_are_halved_beside_points_that_fold_quads(rounds: int) -> None:
+    image = label_image(np.random.default_rng(5).integers(0, 3, (40, 40)))
+    graph = boundaries(image, 5.0)
+    usual, options = Tuning(), MeshingOptions(size=5.0, effort="fast")
+    as_it_was = mesh_boundaries(graph, replace(options, tuning=usual._replace(worst=0.0)))
+    pickier = usual._replace(worst=0.5, rounds=rounds, wishes=min(usual.wishes, rounds))  # so that something is worse
+    mesh = mesh_boundaries(graph, replace(options, tuning=pickier), image.materials)
+    assert_valid_mesh(mesh, image)
+    before, after = (naive.worst_quality(m.points, m.quads) for m in (as_it_was, mesh))
+    assert before < usual.worst < after
+    n, edges, finer = len(graph.points), np.diff(graph.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
+    assert mesh.points[:n].tobytes() == graph.points.tobytes()
+    assert (finer > edges).any()
+    assert (finer % 2 == 0).all()
+    if rounds == 1:
+        assert (finer == 2 * edges).all()
+
+
+def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    y, x = np.mgrid[:60, :70]
+    image = label_image(((x + 4 * np.sin(y / 5)) // 10).astype(np.int32))  # wavy stripes
+    graph = boundaries(image, 4.0)
+    mesh_faces = levels.mesh_faces
+    first, last = int(graph.region_label.argmin()), int(graph.region_label.argmax())
+    rounds: list[set[int]] = []
+
+    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions) -> levels.Meshed:
+        done = mesh_faces(graph, todo, options)
+        worst = np.full(len(todo), 0.95)
+        worst[first], worst[last] = (0.95, 0.2) if rounds else (0.3, 0.3)
+        rounds.append(set(np.flatnonzero(todo).tolist()))
+        return done._replace(worst=worst)
+
+    as_it_was = mesh_boundaries(graph, MeshingOptions(size=4.0, effort="fast"))
+    monkeypatch.setattr(meshing, "mesh_faces", pretended)
+    monkeypatch.setattr(refits, "mesh_faces", pretended)
+    options = MeshingOptions(size=4.0, effort="fast", tuning=Tuning(worst=0.9))
+    mesh = mesh_boundaries(graph, options, image.materials)
+    assert_valid_mesh(mesh, image)
+    assert len(rounds) == Tuning().wishes + 1
+    assert {first, last} <= rounds[1]
+    assert all(last in todo and first not in todo for todo in rounds[2:])
+    edges, finer = np.diff(as_it_was.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
+    beside, far = ((graph.chain_regions == face).any(axis=1) for face in (first, last))
+    assert (finer > edges)[beside].any()
+    assert np.array_equal(finer[far], edges[far])
+
+
+def test_a_wish_that_fails_leaves_the_valid_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    image = label_image(voronoi(60, 50, 9, 1))
+    graph = boundaries(image, 4.0)
+    options = MeshingOptions(size=4.0, effort="fast")
+    as_it_was = mesh_boundaries(graph, options)
+
+    def failing(*_: object) -> None:
+        raise TopologyError("no finer boundary")
+
+    monkeypatch.setattr(refits, "_refitted", failing)
+    mesh = mesh_boundaries(graph, replace(options, tuning=Tuning(worst=0.9)), image.materials)
+    assert mesh.points.tobytes() == as_it_was.points.tobytes()
+    assert_valid_mesh(mesh, image)
+
+
+def test_every_face_has_quads_however_bad_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    def worst_there_is(points: Points, quads: Any, face: Any, worst: Points) -> None:
+        worst[face] = -1.0
+
+    graph = voronoi_graph(64, 3, 2.0, 0)
+    everything = np.ones(len(graph.region_label), bool)
+    monkeypatch.setattr(levels, "lower_to_worst", worst_there_is)
+    for effort in EFFORTS:
+        done = levels.mesh_faces(graph, everything, MeshingOptions(size=2.0, effort=effort))
+        faces = np.concatenate([np.unique(part.face) for part in done.parts])
+        assert sorted(faces.tolist()) == list(range(len(everything)))
+
+
+def test_very_wide_faces_are_split_in_nine_with_the_most_effort() -> None:
+    image = label_image(disc(50, (110, 110), 220))
+    graph = boundaries(image, 2.0, in_twelves=True)
+    options = MeshingOptions(size=2.0, effort="best")
+    nine = mesh_boundaries(graph, options, image.materials)
+    assert_valid_mesh(nine, image)
+    four = mesh_boundaries(graph, replace(options, tuning=Tuning(very_wide=np.inf)), image.materials)
+    ours, theirs = quality_report(nine), quality_report(four)
+    assert ours.irregular < 0.8 * theirs.irregular
+    assert ours.mean_sj > theirs.mean_sj - 0.003
+    assert min(ours.min_sj, theirs.min_sj) > 0.7
+    assert ours.n_quads == pytest.approx(theirs.n_quads, rel=0.03)
+
+
+def test_boundary_nodes_on_the_frame_stay_on_it() -> None:
+    mesh = mesh_boundaries(voronoi_graph(64, 3, 2.0, 0), MeshingOptions(size=2.0, effort="best"))
+    frame = mesh.points[mesh.point_kind == PointKind.FRAME]
+    assert len(frame) > 50
+    assert ((frame == 0) | (frame == 64)).any(axis=1).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_regions_keep_the_area_of_their_outlines(seed: int) -> None:
+    graph = voronoi_graph(64, 3, 2.0, seed)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=2.0))
+    x, y = mesh.points[mesh.quads].transpose(2, 0, 1)
+    area = 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
+    assert area.min() > 0
+    swept = np.zeros(10)
+    (ax, ay), (bx, by) = (graph.points[graph.segments[:, k]].T for k in (0, 1))
+    beside = np.repeat(graph.chain_regions, np.diff(graph.chain_offsets) - 1, axis=0)  # VOID is the last of swept
+    np.add.at(swept, beside[:, 0], 0.5 * (ax * by - ay * bx))
+    np.add.at(swept, beside[:, 1], -0.5 * (ax * by - ay * bx))
+    moved = mesh.points[: len(graph.points)].tobytes() != graph.points.tobytes()
+    found = np.bincount(mesh.quad_region, weights=area)
+    assert np.allclose(found, swept[:-1], rtol=1e-2 if moved else 1e-9)
+    assert found.sum() == pytest.approx(64**2)
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0, 4.0])
+def test_square_is_a_regular_grid_of_the_size_asked_for(size: float) -> None:
+    n = int(32 / size)
+    mesh = mesh_boundaries(polygon_graph([[0, 0], [32, 0], [32, 32], [0, 32]], [n] * 4, (32, 32)), MeshingOptions(size))
+    assert mesh.n_quads == n**2
+    assert np.allclose(edge_lengths(mesh), size)
+    assert irregular_share(mesh) == 0
+
+
+@pytest.mark.parametrize(
+    ("size", "edge", "within", "count"), [(1.5, 0.1, 0.97, 0.15), (3.0, 0.1, 0.97, 0.15), (5.0, 0.12, 0.97, 0.25)]
+)
+def test_final_edges_are_about_as_long_as_asked_for(size: float, edge: float, within: float, count: float) -> None:
+    # at size 5 the disc is 16 edges wide, four of the level it is meshed on
+    mesh = meshed(disc(40, (50, 48), 100), size)
+    lengths = edge_lengths(mesh)
+    assert np.median(lengths) == pytest.approx(size, rel=edge)
+    assert np.mean((lengths > size / 2) & (lengths < size * 1.5)) > within
+    assert mesh.n_quads == pytest.approx(100**2 / size**2, rel=count)
+
+
+@pytest.mark.parametrize("inner", [1.5, 3.0])
+def test_materials_have_their_own_sizes_and_sizes_grow_between(inner: float) -> None:
+    mesh = meshed(disc(25, (60, 60), 120), 5.0, {1: inner})
+    inside = mesh.quad_material == 1
+    assert np.median(edge_lengths(mesh, inside)) == pytest.approx(inner, rel=0.2)
+    at_rim = np.isin(mesh.quads, np.flatnonzero(mesh.point_kind == PointKind.FREE)).any(axis=1)
+    assert np.median(edge_lengths(mesh, at_rim)) == pytest.approx(inner, rel=0.2)
+    distance = np.hypot(*(mesh.points[mesh.quads].mean(axis=1) - 60).T)
+    rings = [np.median(edge_lengths(mesh, (distance > r) & (distance <= r + 12))) for r in range(26, 74, 12)]
+    assert rings == sorted(rings)
+    assert 1.5 * rings[0] < rings[-1] < 5.5 or inner == 3.0
+    assert rings[-1] > 0.75 * 5.0
+
+
+def test_neighbours_are_not_larger_than_growth_allows() -> None:
+    graph = boundaries(label_image(disc(6, (60, 60), 120)), 6.0, material_sizes={1: 1.5})
+    mesh = mesh_boundaries(graph, MeshingOptions(6.0, 1.3, {1: 1.5}))
+    x, y = mesh.points[mesh.quads].transpose(2, 0, 1)
+    size = np.sqrt(0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1))
+    twins = naive.twins(mesh.quads)
+    h = np.flatnonzero(twins >= 0)
+    ratio = size[h // 4] / size[twins[h] // 4]
+    assert np.quantile(ratio, 0.95) < 1.3  # irregular nodes want some play
+    assert size.max() / size.min() > 3
+
+
+def test_slow_growth_takes_more_quads() -> None:
+    image = label_image(disc(6, (60, 60), 120))
+    counts = []
+    for growth in (1.05, 1.3):
+        graph = boundaries(image, 6.0, growth=growth, material_sizes={1: 1.0})
+        counts.append(mesh_boundaries(graph, MeshingOptions(6.0, growth, {1: 1.0})).n_quads)
+    assert counts[0] > 1.2 * counts[1]
+
+
+def test_materials_of_the_picture_are_carried() -> None:
+    image = label_image(voronoi(30, 30, 5, 2) * 3 + 2)
+    graph = boundaries(image, 2.5)
+    assert mesh_boundaries(graph, MeshingOptions(2.5), image.materials).materials is image.materials
+    made_up = mesh_boundaries(graph, MeshingOptions(2.5)).materials
+    assert np.array_equal(made_up.labels, image.materials.labels)
+    assert made_up.names[1] == f"material {image.materials.labels[1]}"
+
+
+@pytest.mark.parametrize("size", [1.5, 4.0])
+def test_void_stays_empty(size: float) -> None:
+    labels = voronoi(40, 50, 6, 3)
+    labels[disc(9, (20, 20), 50)[:40] == 1] = VOID
+    labels[:, 44:] = VOID
+    mesh = meshed(labels, size)
+    centre = mesh.points[mesh.quads].mean(axis=1)
+    assert centre[:, 0].max() < 44.5
+    assert np.hypot(centre[:, 0] - 20, centre[:, 1] - 10 - 0).min() > 0
+    x, y = mesh.points[mesh.quads].transpose(2, 0, 1)
+    area = 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum()
+    assert area == pytest.approx(np.count_nonzero(labels != VOID), rel=0.02)
+
+
+def test_parts_that_do_not_touch() -> None:
+    labels = np.full((20, 30), VOID, np.int32)
+    labels[2:9, 3:12], labels[11:19, 15:28], labels[1, 29] = 0, 1, 2
+    assert set(meshed(labels, 2.0).quad_material.tolist()) == {0, 1, 2}
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 30])
+@pytest.mark.parametrize("colors", [1, 2, 5])
+def test_one_row_or_column(n: int, colors: int) -> None:
+    row = np.arange(n, dtype=np.int32)[None] * 7 % colors
+    for labels in (row, row.T):
+        assert meshed(labels, 2.0).n_quads >= n
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_same_bytes_each_time_and_for_any_number_of_threads(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(batches, "BATCH", 300)
+    graph = boundaries(label_image(voronoi(90, 80, 14, seed)), 2.0)
+    one, again, two = (mesh_boundaries(graph, MeshingOptions(2.0, threads=n)) for n in (1, 1, 2))
+    assert one.n_quads > 5 * 300
+    assert same(one, again)
+    assert same(one, two)
+
+
+def test_input_is_left_as_it_was() -> None:
+    graph = voronoi_graph(64, 3, 2.0, 0)
+    before = graph.points.tobytes(), graph.chain_points.tobytes()
+    mesh_boundaries(graph, MeshingOptions(size=2.0))
+    assert before == (graph.points.tobytes(), graph.chain_points.tobytes())
+
+
+def way(corners: Any) -> Points:
+    """Points along a polygon with 4, 8, 4 edges, without its ends."""
+    sides = [np.linspace(a, b, n, endpoint=False) for (a, b), n in zip(pairwise(corners), (4, 8, 4), strict=True)]
+    return np.vstack(sides)[1:]
+
+
+def bands(upper: Points, lower: Points) -> BoundaryGraph:
+    """Three regions on top of each other in 8 x 8 pixels, two chains of 8 edges from left to right between them."""
+    x = np.arange(9.0)
+    low, high = np.stack([x, lower], axis=1), np.stack([x, upper], axis=1)
+    below = way([low[0], [0, 0], [8, 0], low[8]])
+    above = way([high[8], [8, 8], [0, 8], high[0]])
+    beside = [(low[0] + high[0]) / 2, (low[8] + high[8]) / 2]
+    n = 18 + len(below)
+    m = n + len(above)
+    chains = [
+        [*range(9)],
+        [*range(9, 18)],
+        [0, *range(18, n), 8],
+        [17, *range(n, m), 9],
+        [9, m, 0],
+        [8, m + 1, 17],
+    ]
+    regions = [(1, 0), (2, 1), (0, VOID), (2, VOID), (1, VOID), (1, VOID)]
+    return graph_of(np.vstack([low, high, below, above, beside]), chains, regions, (8, 8))
+
+
+def test_bands_are_meshed() -> None:
+    mesh = mesh_boundaries(bands(np.full(9, 5.0), np.full(9, 3.0)), MeshingOptions(1.0))
+    assert naive.worst_quality(mesh.points, mesh.quads) > 0.5
+    assert set(mesh.quad_region.tolist()) == {0, 1, 2}
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_crossing_chains_are_an_error(effort: str) -> None:
+    wave = 3 * np.sin(np.linspace(0, np.pi, 9))
+    with pytest.raises(TopologyError, match="cross"):
+        mesh_boundaries(bands(5 - wave, 3 + wave), MeshingOptions(1.0, effort=effort))
+
+
+def test_chords_that_contradict_each_other_are_refined() -> None:
+    # every second point of both chains alone: the upper chain's chords run below the lower chain's top
+    lower = np.array([3, 3, 3, 3.9, 4.4, 3.9, 3, 3, 3.0])
+    upper = np.array([5, 5, 4, 4.55, 4.6, 4.55, 4, 5, 5.0])
+    graph = bands(upper, lower)
+    mesh = mesh_boundaries(graph, MeshingOptions(1.0))
+    assert naive.worst_quality(mesh.points, mesh.quads) > 0
+    x, y = mesh.points[mesh.quads].transpose(2, 0, 1)
+    assert 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum() == pytest.approx(64)
+
+
+def test_island_on_the_wrong_side_of_a_chord_is_kept_on_its_own() -> None:
+    s = np.linspace(0, 1, 9)
+    graph = bands(np.full(9, 7.0), 3 + 2.5 * np.sin(np.pi * s) ** 8)
+    n = len(graph.points)
+    turn = 2 * np.pi * np.arange(6) / 6
+    island = np.array([4.0, 5.05]) + 0.12 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    chains = [*(graph.chain(c).tolist() for c in range(graph.n_chains)), [*range(n, n + 6), n]]
+    regions = [*map(tuple, graph.chain_regions.tolist()), (3, 0)]
+    whole = graph_of(np.vstack([graph.points, island]), chains, regions, (8, 8))
+    mesh = mesh_boundaries(whole, MeshingOptions(1.0))
+    assert naive.worst_quality(mesh.points, mesh.quads) > 0
+    assert set(mesh.quad_region.tolist()) == {0, 1, 2, 3}
+    assert np.allclose(mesh.points[mesh.quads[mesh.quad_region == 3]].mean(axis=(0, 1)), [4, 5.05], atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"size": 0.0}, "size is 0.0; give a length"),
+        ({"size": float("nan")}, "size is nan"),
+        ({"size": float("inf")}, "size is inf"),
+        ({"material_sizes": {3: -1.0}}, "size of material 3 is -1.0"),
+        ({"growth": 1.0}, "growth is 1.0; give a ratio from 1.01"),
+        ({"effort": "most"}, "effort is 'most'; give one of fast, normal, best"),
+        ({"threads": 0}, "threads is 0; give at least 1"),
+    ],
+)
+def test_bad_options_are_named_with_their_value_and_the_remedy(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        MeshingOptions(**options)

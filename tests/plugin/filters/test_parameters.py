@@ -1,0 +1,111 @@
+"""Every parameter of filters.xml refuses nonsense in the filters, the way PyVista's own filters do."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from imgquad_mesh import filters
+from imgquad_mesh.spec import Parameter
+from imgquad_mesh.spec import filters as described
+from support.images import point_image
+
+IMAGE = point_image()
+LINES = IMAGE.imgquad.boundaries()
+SMOOTH = LINES.imgquad.smooth()
+
+#: our filter of each filter in filters.xml that makes or changes an image, boundaries or a mesh
+CALLS: dict[str, Callable[..., Any]] = {
+    "compute_label_by_color_clustering_per_pixel": lambda **k: filters.segment(IMAGE, **k),
+    "apply_label_noise_removal_per_pixel": lambda **k: filters.remove_noise(IMAGE, **k),
+    "delete_material_from_image": lambda **k: filters.drop_materials(IMAGE, k["drop"]),
+    "generate_polyline_from_material_boundaries": lambda **k: filters.boundaries(IMAGE, **k),
+    "apply_coord_material_boundary_smoothing": lambda **k: filters.smooth(LINES, **k),
+    "generate_quad_mesh_from_material_boundaries": lambda **k: filters.quads(SMOOTH, **k),
+    "generate_quad_mesh_from_image": lambda **k: filters.mesh(IMAGE, **k),
+}
+#: PyVista has its own ways: extract_subset, spacing, and the image is in memory already
+ELSEWHERE = {"crop", "pixel_size", "max_pixels", "frame"}
+
+NONSENSE: dict[str, list[Any]] = {
+    "Real": ["x", float("nan"), float("inf"), -1, 1j, [1, 2], {}],
+    "Int": ["x", float("nan"), 2.5, 0, -1, [1, 2]],
+    "Boolean": ["yes", 1, None],
+    "Enum": ["nonsense", 7, None],
+}
+NONSENSE_TEXTS: dict[str, list[Any]] = {
+    "colors": ["blue", 0, 1000, 2.5, [(1, 2)], [(1, 2, 300)], None],
+    "boundary_size": ["x", -1, 0, float("nan"), [1]],
+    "material_sizes": ["x", 3, {1: "x"}, {1: -1}, {1: 0}, {1.5: 2}, {77: 1}, {"gold": 1}, {1: float("inf")}],
+    "min_pixels": ["x", -1, 2.5, float("nan"), None],
+    "min_length": ["x", -1, float("nan"), None],
+    "drop": [3, [1.5], ["gold"], [77], None],
+}
+
+
+def cases() -> Iterator[Any]:
+    for name, call in CALLS.items():
+        for parameter in described()[name].parameters:
+            if parameter.field not in ELSEWHERE:
+                yield pytest.param(call, parameter, id=f"{name.split('_from_')[-1]}-{parameter.field}")
+
+
+@pytest.mark.parametrize(("call", "parameter"), list(cases()))
+def test_nonsense_is_refused_by_name(call: Callable[..., Any], parameter: Parameter) -> None:
+    name = parameter.field
+    table = NONSENSE_TEXTS[name] if parameter.kind == "String" else NONSENSE[parameter.kind]
+    if parameter.field.startswith("min_"):
+        table = NONSENSE_TEXTS[name]
+    if call is CALLS["generate_quad_mesh_from_material_boundaries"]:
+        table = [bad for bad in table if bad is not None]
+    if name == "drop" and call is CALLS["delete_material_from_image"]:
+        table = [bad for bad in table if bad != 3] + [77]
+    for bad in table:
+        with pytest.raises((TypeError, ValueError)) as caught:
+            call(**{name: bad})
+        said = str(caught.value)
+        assert name in said or "material" in said or name.replace("_", " ") in said, f"{bad!r}: {said}"
+    if parameter.low is not None and parameter.high is not None:
+        for bad in (parameter.low - 0.001, parameter.high + 0.001):
+            with pytest.raises(ValueError, match=f"{name} values must all be"):
+                call(**{name: bad})
+
+
+def test_every_parameter_of_filters_xml_is_a_parameter_here() -> None:
+    functions = (
+        filters.segment,
+        filters.remove_noise,
+        None,
+        filters.boundaries,
+        filters.smooth,
+        filters.quads,
+        filters.mesh,
+    )
+    for name, function in zip(CALLS, functions, strict=True):
+        if function is not None:
+            fields = {p.field for p in described()[name].parameters} - ELSEWHERE
+            assert fields <= set(inspect.signature(function).parameters), name
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: IMAGE.imgquad.mesh(size=None), "size must be a number. Got <class 'NoneType'> instead."),
+        (lambda: IMAGE.imgquad.mesh(policy="x"), "policy 'x' is not valid. policy must be one of:"),
+        (lambda: IMAGE.imgquad.mesh(unit="metre"), "unit 'metre' is not valid. unit must be one of:"),
+        (lambda: IMAGE.imgquad.mesh(progress_bar=1), "progress_bar must be an instance of <class 'bool'>."),
+        (lambda: IMAGE.imgquad.mesh(size=0), "size values must all be greater than 0.0."),
+        (lambda: IMAGE.imgquad.mesh(size=0.01), "size is 0.01; give a length of at least 0.05 px"),
+        (lambda: IMAGE.imgquad.mesh(threads=0), "threads is 0; give at least 1"),
+        (lambda: SMOOTH.imgquad.quads().imgquad.optimize(effort="x"), "effort 'x' is not valid."),
+        (lambda: SMOOTH.imgquad.quads().imgquad.plot("area"), "scalars 'area' is not valid."),
+        (lambda: IMAGE.imgquad.mesh("label", 3), "takes from 1 to 2 positional arguments but 3 were given"),
+    ],
+)
+def test_messages(call: Callable[[], Any], message: str) -> None:
+    with pytest.raises((TypeError, ValueError)) as caught:
+        call()
+    assert message in str(caught.value)
