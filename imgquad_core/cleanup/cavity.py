@@ -13,7 +13,7 @@ from imgquad_core.grouping import grouped
 from imgquad_core.jit import kernel, verb
 
 from .faces import INNER_VALENCE, FaceQuads
-from .patterns import Canvas
+from .patterns import POINTS, QUADS, Canvas
 
 
 class Net(NamedTuple):
@@ -28,7 +28,7 @@ class Net(NamedTuple):
     rim: Flags
     free_quads: Ints  # stack of unused quad ids
     free_nodes: Ints
-    tops: Ints  # [free quads, free nodes] on the stacks
+    tops: Ints  # how many are on the stacks, at the places `QUADS` and `POINTS`
     face: Ints  # (capacity,): face of each quad
 
 
@@ -46,10 +46,10 @@ class Cavity(NamedTuple):
     edge: Ints  # half-edge of the outline that leaves each of its nodes
     corner: Ints  # places of the corners in the outline
     length: Ints  # edges between corners
-    count: Ints  # type: ignore[assignment]  # see below
+    tally: Ints  # numbers, at the places that follow
 
 
-# what Cavity.count holds
+# what Cavity.tally holds
 MEMBERS, OUTLINE, CORNERS, STAMP, RIM_EDGES, COST, DOUBTFUL = range(7)
 
 
@@ -72,7 +72,7 @@ def net_of(mesh: FaceQuads, largest: int) -> Net:
         padded(mesh.origin >= 0, node_room, False),
         _free_ids(m, quad_room),
         _free_ids(n, node_room),
-        np.array([quad_room - m, node_room - n]),
+        np.array([node_room - n, quad_room - m]),
         padded(mesh.face, quad_room, -1),
     )
 
@@ -147,50 +147,50 @@ def penalty(valence: int, wanted: int, rim: bool) -> int:
 @kernel
 def begin(cavity: Cavity) -> None:
     """Empty the cavity."""
-    cavity.count[STAMP] += 1
+    cavity.tally[STAMP] += 1
     for i in (MEMBERS, OUTLINE, CORNERS, RIM_EDGES, COST, DOUBTFUL):
-        cavity.count[i] = 0
+        cavity.tally[i] = 0
 
 
 @verb
 def add_quad(net: Net, cavity: Cavity, q: int) -> None:
     """Put quad q into the cavity and bring the outline up to date."""
-    count = cavity.count
-    stamp = count[STAMP]
-    if cavity.in_cavity[q] == stamp or count[MEMBERS] == cavity.members.size:
+    tally = cavity.tally
+    stamp = tally[STAMP]
+    if cavity.in_cavity[q] == stamp or tally[MEMBERS] == cavity.members.size:
         return
     cavity.in_cavity[q] = stamp
-    cavity.members[count[MEMBERS]] = q
-    count[MEMBERS] += 1
+    cavity.members[tally[MEMBERS]] = q
+    tally[MEMBERS] += 1
     for k in range(4):
         v = net.quads[q, k]
         if cavity.seen[v] != stamp:
             cavity.seen[v], cavity.inside[v], cavity.leaving[v] = stamp, 0, 0
-            count[COST] += penalty(net.valence[v], net.wanted[v], net.rim[v])
+            tally[COST] += penalty(net.valence[v], net.wanted[v], net.rim[v])
         cavity.inside[v] += 1
-        cavity.doubtful[count[DOUBTFUL]] = v
-        count[DOUBTFUL] += 1
+        cavity.doubtful[tally[DOUBTFUL]] = v
+        tally[DOUBTFUL] += 1
     for h in range(4 * q, 4 * q + 4):  # the neighbours' edges vanish from the outline ...
         t = net.twins[h]
         if t >= 0 and cavity.in_cavity[t >> 2] == stamp:
             cavity.leaving[net.quads[t >> 2, t & 3]] -= 1
-            count[RIM_EDGES] -= 1
+            tally[RIM_EDGES] -= 1
     for h in range(4 * q, 4 * q + 4):  # ... and the others of the quad become part of it
         t = net.twins[h]
         if t < 0 or cavity.in_cavity[t >> 2] != stamp:
             v = net.quads[q, h & 3]
             cavity.leaving[v] += 1
             cavity.leave[v] = h
-            count[RIM_EDGES] += 1
+            tally[RIM_EDGES] += 1
 
 
 @verb
 def add_ring(net: Net, cavity: Cavity, v: int) -> bool:
     """Put all quads at node v into the cavity; return whether that was any."""
-    before = cavity.count[MEMBERS]
+    before = cavity.tally[MEMBERS]
     for i in range(net.valence[v]):
         add_quad(net, cavity, net.ring[v, i])
-    return bool(cavity.count[MEMBERS] > before)
+    return bool(cavity.tally[MEMBERS] > before)
 
 
 @verb
@@ -199,18 +199,18 @@ def settle(net: Net, cavity: Cavity, largest: int, most_needed: int) -> bool:
 
     Returns whether that was possible with at most `largest` quads, and the outline is one loop.
     """
-    count = cavity.count
-    while count[DOUBTFUL] > 0:
-        if count[MEMBERS] > largest:
+    tally = cavity.tally
+    while tally[DOUBTFUL] > 0:
+        if tally[MEMBERS] > largest:
             return False
-        count[DOUBTFUL] -= 1
-        v = cavity.doubtful[count[DOUBTFUL]]
+        tally[DOUBTFUL] -= 1
+        v = cavity.doubtful[tally[DOUBTFUL]]
         if cavity.leaving[v] == 0:
             continue
         need = net.wanted[v] - (net.valence[v] - cavity.inside[v])
         if (cavity.leaving[v] > 1 or need > most_needed) and not add_ring(net, cavity, v):
             return False
-    return count[MEMBERS] <= largest and _trace_outline(net, cavity)
+    return tally[MEMBERS] <= largest and _trace_outline(net, cavity)
 
 
 @verb
@@ -218,14 +218,14 @@ def _leaving_edge(net: Net, cavity: Cavity, v: int) -> int:
     """Return the half-edge of the outline that leaves node v."""
     h = cavity.leave[v]
     t = net.twins[h]
-    if t < 0 or cavity.in_cavity[t >> 2] != cavity.count[STAMP]:
+    if t < 0 or cavity.in_cavity[t >> 2] != cavity.tally[STAMP]:
         return int(h)
     for i in range(net.valence[v]):  # it has become inner: v was a pinch for a while
         q = net.ring[v, i]
-        if cavity.in_cavity[q] == cavity.count[STAMP]:
+        if cavity.in_cavity[q] == cavity.tally[STAMP]:
             for h in range(4 * q, 4 * q + 4):
                 t = net.twins[h]
-                if net.quads[q, h & 3] == v and (t < 0 or cavity.in_cavity[t >> 2] != cavity.count[STAMP]):
+                if net.quads[q, h & 3] == v and (t < 0 or cavity.in_cavity[t >> 2] != cavity.tally[STAMP]):
                     return int(h)
     return -1
 
@@ -233,10 +233,10 @@ def _leaving_edge(net: Net, cavity: Cavity, v: int) -> int:
 @verb
 def _trace_outline(net: Net, cavity: Cavity) -> bool:
     """Trace the outline and find its corners; return whether it is one loop."""
-    count = cavity.count
-    total = count[RIM_EDGES]
+    tally = cavity.tally
+    total = tally[RIM_EDGES]
     start: Any = np.int64(-1)
-    for i in range(count[MEMBERS] - 1, -1, -1):
+    for i in range(tally[MEMBERS] - 1, -1, -1):
         for k in range(4):
             if start < 0 and cavity.leaving[net.quads[cavity.members[i], k]] > 0:
                 start = net.quads[cavity.members[i], k]
@@ -261,14 +261,14 @@ def _trace_outline(net: Net, cavity: Cavity) -> bool:
             break
     if c > 0:
         cavity.length[c - 1] = n - cavity.corner[c - 1] + cavity.corner[0]
-    count[OUTLINE], count[CORNERS] = n, c
+    tally[OUTLINE], tally[CORNERS] = n, c
     return bool(n == total)
 
 
 @verb
 def push_side(net: Net, cavity: Cavity) -> bool:
     """Grow the cavity by the row behind one side: the one with most irregular nodes, then the longest."""
-    n, n_loop, stamp = cavity.count[CORNERS], cavity.count[OUTLINE], cavity.count[STAMP]
+    n, n_loop, stamp = cavity.tally[CORNERS], cavity.tally[OUTLINE], cavity.tally[STAMP]
     best, best_score = -1, -1
     for s in range(n):
         score, blocked = 0, False
@@ -294,51 +294,51 @@ def push_side(net: Net, cavity: Cavity) -> bool:
 @verb
 def push_all(net: Net, cavity: Cavity) -> bool:
     """Grow the cavity on all sides."""
-    before, n_loop = cavity.count[MEMBERS], cavity.count[OUTLINE]
+    before, n_loop = cavity.tally[MEMBERS], cavity.tally[OUTLINE]
     for i in range(n_loop):
         t = net.twins[cavity.edge[i]]
         if t >= 0:
             add_quad(net, cavity, t >> 2)
-    return bool(cavity.count[MEMBERS] > before)
+    return bool(cavity.tally[MEMBERS] > before)
 
 
 @verb
 def remove(net: Net, cavity: Cavity) -> None:
     """Take the cavity's quads out of the mesh."""
-    stamp = cavity.count[STAMP]
-    for i in range(cavity.count[OUTLINE]):
+    stamp = cavity.tally[STAMP]
+    for i in range(cavity.tally[OUTLINE]):
         v, n = cavity.loop[i], 0
         for j in range(net.valence[v]):
             if cavity.in_cavity[net.ring[v, j]] != stamp:
                 net.ring[v, n] = net.ring[v, j]
                 n += 1
         net.valence[v] = n
-    for i in range(cavity.count[MEMBERS]):
+    for i in range(cavity.tally[MEMBERS]):
         q = cavity.members[i]
         for k in range(4):
             v = net.quads[q, k]
             if cavity.leaving[v] == 0 and net.valence[v] > 0:
                 net.valence[v] = 0
-                net.free_nodes[net.tops[1]] = v
-                net.tops[1] += 1
+                net.free_nodes[net.tops[POINTS]] = v
+                net.tops[POINTS] += 1
         net.quads[q, 0] = -1
-        net.free_quads[net.tops[0]] = q
-        net.tops[0] += 1
+        net.free_quads[net.tops[QUADS]] = q
+        net.tops[QUADS] += 1
 
 
 @kernel
 def insert(net: Net, canvas: Canvas, new_id: Ints, face: int) -> None:
     """Put the drawn quads into the mesh."""
-    for p in range(canvas.count[0]):
-        net.tops[1] -= 1
-        v = net.free_nodes[net.tops[1]]
+    for p in range(canvas.tally[POINTS]):
+        net.tops[POINTS] -= 1
+        v = net.free_nodes[net.tops[POINTS]]
         new_id[p] = v
         for i in range(2):
             net.points[v, i] = canvas.points[canvas.first + p, i]
         net.wanted[v], net.rim[v], net.valence[v] = INNER_VALENCE, False, 0
-    for i in range(canvas.count[1]):
-        net.tops[0] -= 1
-        q = net.free_quads[net.tops[0]]
+    for i in range(canvas.tally[QUADS]):
+        net.tops[QUADS] -= 1
+        q = net.free_quads[net.tops[QUADS]]
         net.face[q] = face
         for k in range(4):
             v = canvas.quads[i, k]
@@ -348,7 +348,7 @@ def insert(net: Net, canvas: Canvas, new_id: Ints, face: int) -> None:
             net.ring[v, net.valence[v]] = q
             net.valence[v] += 1
         canvas.quads[i, 0] = q  # from here on: the ids of the new quads
-    for i in range(canvas.count[1]):
+    for i in range(canvas.tally[QUADS]):
         _join(net, canvas.quads[i, 0])
 
 

@@ -39,7 +39,7 @@ from .cavity import (
     settle,
 )
 from .faces import FaceQuads
-from .patterns import MAX_CORNERS, Canvas, choose_cut, cut_quads, draw_cut, piece_fits, smooth_drawn
+from .patterns import MAX_CORNERS, POINTS, QUADS, Canvas, choose_cut, cut_quads, draw_cut, piece_fits, smooth_drawn
 
 TRIAL_SWEEPS = 5
 SMALLEST_SHARE, LARGEST_SHARE = 0.15, 4.0  # of a new quad's area in the mean of the cavity
@@ -89,10 +89,10 @@ def clean_up(mesh: FaceQuads, how: CleanUp, seeds: Flags | None = None) -> FaceQ
 def _cost_then(net: Net, cavity: Cavity, inner: int) -> int:
     """Irregularity with a pattern that has `inner` irregular nodes, one quad at each corner and two beside sides."""
     cost, c = inner, 0
-    for i in range(cavity.count[OUTLINE]):
+    for i in range(cavity.tally[OUTLINE]):
         v = cavity.loop[i]
         quads = 2
-        if c < cavity.count[CORNERS] and cavity.corner[c] == i:
+        if c < cavity.tally[CORNERS] and cavity.corner[c] == i:
             quads, c = 1, c + 1
         cost += penalty(net.valence[v] - cavity.inside[v] + quads, net.wanted[v], net.rim[v])
     return cost
@@ -100,7 +100,7 @@ def _cost_then(net: Net, cavity: Cavity, inner: int) -> int:
 
 @verb
 def _mean_edge(points: Floats, cavity: Cavity) -> float:
-    total, n = 0.0, cavity.count[OUTLINE]
+    total, n = 0.0, cavity.tally[OUTLINE]
     for i in range(n):
         u, w = cavity.loop[i], cavity.loop[(i + 1) % n]
         total += np.hypot(points[u, 0] - points[w, 0], points[u, 1] - points[w, 1])
@@ -111,14 +111,14 @@ def _mean_edge(points: Floats, cavity: Cavity) -> float:
 def _is_better(net: Net, cavity: Cavity, canvas: Canvas, gain: int, tolerance: float, worst: float) -> bool:
     """Whether the drawn pattern may replace the cavity."""
     old_sum, old_worst, area = 0.0, 1.0, 0.0
-    for i in range(cavity.count[MEMBERS]):
+    for i in range(cavity.tally[MEMBERS]):
         quality = quad_quality(net.points, net.quads, cavity.members[i])
         old_sum += 1.0 - quality
         old_worst = min(old_worst, quality)
         area += quad_area(net.points, net.quads, cavity.members[i])
-    need, mean = min(worst, old_worst), area / cavity.count[MEMBERS]
+    need, mean = min(worst, old_worst), area / cavity.tally[MEMBERS]
     new_sum = 0.0
-    for q in range(canvas.count[1]):
+    for q in range(canvas.tally[QUADS]):
         quality = quad_quality(net.points, canvas.quads, q)
         if quality < need or quality <= 0.0:
             return False
@@ -132,12 +132,12 @@ def _is_better(net: Net, cavity: Cavity, canvas: Canvas, gain: int, tolerance: f
 @inlined
 def _has_room(net: Net, cavity: Cavity, cut: Ints) -> bool:
     """Whether the pattern has about as many quads as the cavity, and mesh and rings can hold it."""
-    quads = cut_quads(cavity.length, cavity.count[CORNERS], cut)
-    if not FEWEST * cavity.count[MEMBERS] <= quads <= MOST * cavity.count[MEMBERS]:
+    quads = cut_quads(cavity.length, cavity.tally[CORNERS], cut)
+    if not FEWEST * cavity.tally[MEMBERS] <= quads <= MOST * cavity.tally[MEMBERS]:
         return False
-    if quads > net.tops[0] or quads > net.tops[1]:
+    if quads > net.tops[QUADS] or quads > net.tops[POINTS]:
         return False
-    for i in range(cavity.count[OUTLINE]):
+    for i in range(cavity.tally[OUTLINE]):
         v = cavity.loop[i]
         if net.valence[v] - cavity.inside[v] + 2 > net.ring.shape[1]:
             return False
@@ -147,7 +147,7 @@ def _has_room(net: Net, cavity: Cavity, cut: Ints) -> bool:
 @inlined
 def _choose(net: Net, cavity: Cavity, cut: Ints, last_gain: int, last_size: int) -> int:
     """Return the gain of the best pattern for the cavity's outline, 0 where none helps; `cut` tells how it is cut."""
-    n = cavity.count[CORNERS]
+    n = cavity.tally[CORNERS]
     cut[4] = 0
     if n < 2 or n > MAX_CORNERS:
         return 0
@@ -155,8 +155,8 @@ def _choose(net: Net, cavity: Cavity, cut: Ints, last_gain: int, last_size: int)
     if not whole and n != 2 and n != 4 and n != 6:
         return 0
     inner = (0 if n == 4 else 1) if whole else 2
-    gain = cavity.count[COST] - _cost_then(net, cavity, inner)
-    if gain <= 0 or (gain <= last_gain and cavity.count[MEMBERS] < RETRY * last_size):
+    gain = cavity.tally[COST] - _cost_then(net, cavity, inner)
+    if gain <= 0 or (gain <= last_gain and cavity.tally[MEMBERS] < RETRY * last_size):
         return 0
     edge = _mean_edge(net.points, cavity)
     if whole or choose_cut(net.points, cavity.loop, cavity.corner, cavity.length, n, edge, cut):
@@ -191,8 +191,8 @@ def _clean_pass(
             gain = _choose(net, cavity, cut, last_gain, last_size)
             if gain > 0:
                 if _has_room(net, cavity, cut):
-                    canvas.count[0], canvas.count[1] = 0, 0
-                    draw_cut(canvas, cavity.loop, cavity.corner, cavity.length, cavity.count[CORNERS], cut)
+                    canvas.tally[POINTS], canvas.tally[QUADS] = 0, 0
+                    draw_cut(canvas, cavity.loop, cavity.corner, cavity.length, cavity.tally[CORNERS], cut)
                     smooth_drawn(canvas, TRIAL_SWEEPS)
                     if _is_better(net, cavity, canvas, gain, tolerance, worst):
                         face = net.face[cavity.members[0]]
@@ -200,8 +200,8 @@ def _clean_pass(
                         insert(net, canvas, new_id, face)
                         done += 1
                         break
-                last_gain, last_size = gain, cavity.count[MEMBERS]
-            grown = push_all(net, cavity) if cavity.count[CORNERS] < 2 else push_side(net, cavity)
+                last_gain, last_size = gain, cavity.tally[MEMBERS]
+            grown = push_all(net, cavity) if cavity.tally[CORNERS] < 2 else push_side(net, cavity)
             if not grown:
                 break
     return done

@@ -28,16 +28,19 @@ from imgquad_core.jit import inlined, kernel, verb
 MAX_CORNERS = 6
 
 
+POINTS, QUADS = range(2)  #: places of what `Canvas.tally` counts
+
+
 class Canvas(NamedTuple):
     """Where a pattern is drawn: scratch points behind those of the mesh, and quads.
 
-    ``count`` holds [number of points drawn, number of quads drawn]; drawn point i has the id ``first + i``.
+    Drawn point i has the id ``first + i``.
     """
 
     points: Floats  #: points of the mesh with room for the drawn ones from ``first`` on
     first: int
     quads: Ints  #: (capacity, 4)
-    count: Ints  # type: ignore[assignment]  #: (2,)
+    tally: Ints  #: (2,), numbers of what is drawn, at the places `POINTS` and `QUADS`
     lattice: Ints  #: scratch of a grid's node ids
     poly: Ints  #: scratch of a piece's outline
     spokes: Ints  #: scratch of spokes' node ids
@@ -146,9 +149,9 @@ def cut_quads(length: Ints, n: int, cut: Ints) -> int:
 
 @verb
 def _draw_point(canvas: Canvas, x: float, y: float) -> int:
-    p = canvas.first + canvas.count[0]
+    p = canvas.first + canvas.tally[POINTS]
     canvas.points[p, 0], canvas.points[p, 1] = x, y
-    canvas.count[0] += 1
+    canvas.tally[POINTS] += 1
     return int(p)
 
 
@@ -183,10 +186,10 @@ def _draw_grid(canvas: Canvas, n: int, m: int) -> None:
             grid[j * w + i] = _draw_point(canvas, x, y)
     for j in range(m):
         for i in range(n):
-            q = canvas.count[1]
+            q = canvas.tally[QUADS]
             canvas.quads[q, 0], canvas.quads[q, 1] = grid[j * w + i], grid[j * w + i + 1]
             canvas.quads[q, 2], canvas.quads[q, 3] = grid[(j + 1) * w + i + 1], grid[(j + 1) * w + i]
-            canvas.count[1] += 1
+            canvas.tally[QUADS] += 1
 
 
 @inlined
@@ -262,11 +265,11 @@ def draw_cut(canvas: Canvas, loop: Ints, corner: Ints, length: Ints, n: int, cut
 @kernel
 def smooth_drawn(canvas: Canvas, sweeps: int) -> None:
     """Move the drawn points to the mean of their neighbours, all at once, `sweeps` times."""
-    n, sums = canvas.count[0], canvas.sums
+    n, sums = canvas.tally[POINTS], canvas.sums
     for _ in range(sweeps):
         for p in range(n):
             sums[p, 0], sums[p, 1], sums[p, 2] = 0.0, 0.0, 0.0
-        for q in range(canvas.count[1]):
+        for q in range(canvas.tally[QUADS]):
             for k in range(4):
                 p = canvas.quads[q, k] - canvas.first
                 if p >= 0:  # each neighbour of a drawn point follows it in exactly one quad

@@ -37,7 +37,7 @@ from .cavity import (
     settle,
 )
 from .faces import FaceQuads
-from .patterns import Canvas
+from .patterns import POINTS, QUADS, Canvas
 
 LARGEST = 24  # quads of a cavity
 LONGEST = 16  # nodes of an outline
@@ -117,16 +117,16 @@ def _draw_fill(canvas: Canvas, loop: Ints, n: int, tables: Tables) -> None:
     runs = np.empty((2 * n, 2), np.int64)
     runs[0, 0], runs[0, 1] = 0, n - 1
     top = 1
-    canvas.count[0], canvas.count[1] = 0, 0
+    canvas.tally[POINTS], canvas.tally[QUADS] = 0, 0
     while top > 0:
         top -= 1
         i, j = runs[top, 0], runs[top, 1]
         if j - i < 3:
             continue
-        a, b, q = tables.first[i, j], tables.second[i, j], canvas.count[1]
+        a, b, q = tables.first[i, j], tables.second[i, j], canvas.tally[QUADS]
         canvas.quads[q, 0], canvas.quads[q, 1] = loop[i], loop[a]
         canvas.quads[q, 2], canvas.quads[q, 3] = loop[b], loop[j]
-        canvas.count[1] += 1
+        canvas.tally[QUADS] += 1
         runs[top, 0], runs[top, 1] = i, a
         runs[top + 1, 0], runs[top + 1, 1] = a, b
         runs[top + 2, 0], runs[top + 2, 1] = b, j
@@ -137,7 +137,7 @@ def _draw_fill(canvas: Canvas, loop: Ints, n: int, tables: Tables) -> None:
 def _worst_drawn(canvas: Canvas, floor: float) -> float:
     """Return the worst quality of the drawn quads, or one that is not above `floor`."""
     worst = 1.0
-    for q in range(canvas.count[1]):
+    for q in range(canvas.tally[QUADS]):
         worst = min(worst, quad_quality(canvas.points, canvas.quads, q))
         if worst <= floor:
             break
@@ -147,7 +147,7 @@ def _worst_drawn(canvas: Canvas, floor: float) -> float:
 @inlined
 def _draw_star(canvas: Canvas, loop: Ints, n: int, turn: int) -> float:
     """Draw a star whose centre is joined to the nodes turn, turn + 2, ...; return its worst quality."""
-    canvas.count[0], canvas.count[1] = 1, n // 2
+    canvas.tally[POINTS], canvas.tally[QUADS] = 1, n // 2
     o = canvas.first
     canvas.points[o, 0], canvas.points[o, 1], reach = 0.0, 0.0, 0.0
     for i in range(n):
@@ -203,13 +203,13 @@ def _grow(net: Net, cavity: Cavity, q: int, trial: int) -> bool:
                 add_ring(net, cavity, net.quads[q, k])
             elif net.twins[4 * q + k] >= 0:
                 add_quad(net, cavity, net.twins[4 * q + k] >> 2)
-    return settle(net, cavity, LARGEST, ANY) and cavity.count[OUTLINE] <= LONGEST
+    return settle(net, cavity, LARGEST, ANY) and cavity.tally[OUTLINE] <= LONGEST
 
 
 @verb
 def _worst_member(net: Net, cavity: Cavity) -> float:
     worst = 1.0
-    for i in range(cavity.count[MEMBERS]):
+    for i in range(cavity.tally[MEMBERS]):
         worst = min(worst, quad_quality(net.points, net.quads, cavity.members[i]))
     return worst
 
@@ -224,8 +224,8 @@ def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) ->
     for i in range(2):
         canvas.points[o, i] = 0.5 * (net.points[a, i] + net.points[c, i])
     merged = a if net.rim[a] else (c if net.rim[c] else o)
-    canvas.count[0], canvas.count[1] = merged == o, 0
-    for i in range(cavity.count[MEMBERS]):
+    canvas.tally[POINTS], canvas.tally[QUADS] = merged == o, 0
+    for i in range(cavity.tally[MEMBERS]):
         if cavity.members[i] == q:
             continue
         for j in range(4):
@@ -234,8 +234,8 @@ def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) ->
                 v = merged
             elif cavity.leaving[v] == 0:
                 return -1.0  # another inner node would be left with two quads
-            canvas.quads[canvas.count[1], j] = v
-        canvas.count[1] += 1
+            canvas.quads[canvas.tally[QUADS], j] = v
+        canvas.tally[QUADS] += 1
     reach = np.hypot(net.points[a, 0] - net.points[c, 0], net.points[a, 1] - net.points[c, 1])
     return _centred(canvas, reach) if merged == o else _worst_drawn(canvas, -1.0)
 
@@ -246,7 +246,7 @@ def _draw(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, choi
 
     A filling no better than `floor` is of no use.
     """
-    n = cavity.count[OUTLINE]
+    n = cavity.tally[OUTLINE]
     if choice.cavity >= COLLAPSE:
         return _draw_collapsed(net, cavity, canvas, q, choice.cavity - COLLAPSE) if choice.filling == 0 else -1.0
     if choice.filling > 0:
@@ -260,10 +260,10 @@ def _draw(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, choi
 @verb
 def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
     """Whether nodes of the outline can take all drawn quads."""
-    for i in range(cavity.count[OUTLINE]):
-        if net.valence[cavity.loop[i]] + canvas.count[1] > net.ring.shape[1]:
+    for i in range(cavity.tally[OUTLINE]):
+        if net.valence[cavity.loop[i]] + canvas.tally[QUADS] > net.ring.shape[1]:
             return False
-    return bool(canvas.count[1] <= net.tops[0] and canvas.count[0] <= net.tops[1])
+    return bool(canvas.tally[QUADS] <= net.tops[QUADS] and canvas.tally[POINTS] <= net.tops[POINTS])
 
 
 @inlined
@@ -298,7 +298,7 @@ def _fill(net: Net, cavity: Cavity, canvas: Canvas, new_id: Ints, hopeless: Flag
     face = net.face[cavity.members[0]]
     remove(net, cavity)
     insert(net, canvas, new_id, face)
-    for i in range(cavity.count[OUTLINE]):
+    for i in range(cavity.tally[OUTLINE]):
         v = cavity.loop[i]
         for j in range(net.valence[v]):
             hopeless[net.ring[v, j]], fresh[net.ring[v, j]] = False, True

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from imgquad_core.cleanup.patterns import (
+    QUADS,
     Canvas,
     choose_cut,
     cut_quads,
@@ -49,7 +50,7 @@ def canvas_on(points: Points) -> Canvas:
 
 
 def drawn(canvas: Canvas) -> tuple[Points, Ids]:
-    n_points, n_quads = canvas.count
+    n_points, n_quads = canvas.tally
     return canvas.points[: canvas.first + n_points], canvas.quads[:n_quads]
 
 
@@ -92,7 +93,7 @@ def test_every_whole_pattern(n: int, most: int, irregular: list[int]) -> None:
     assert len(ways) > 20
     for length in ways:
         canvas, outline, corner = piece_on(length)
-        assert canvas.count[1] == piece_quads(length, n)
+        assert canvas.tally[QUADS] == piece_quads(length, n)
         assert_pattern(canvas, outline, corner, irregular)
         smooth_drawn(canvas, 3)
         assert_pattern(canvas, outline, corner, irregular)
@@ -152,7 +153,7 @@ def test_every_cut(n: int, least: int, most: int, irregular: list[int], fewest: 
         if result is None:
             continue
         canvas, outline, corner, cut = result
-        assert canvas.count[1] == cut_quads(length, n, cut)
+        assert canvas.tally[QUADS] == cut_quads(length, n, cut)
         assert_pattern(canvas, outline, corner, irregular)
         smooth_drawn(canvas, 5)
         assert canvas.points[: len(outline)].tobytes() == outline.tobytes()
