@@ -59,6 +59,8 @@ class MeshOptions:
         How far the mesh is optimised.
     threads : int
         Number of threads of the meshing stage; the mesh does not depend on it.
+    triangulator : "auto", "triangle" or "cdt"
+        Who makes the Delaunay triangles that quads come from; `auto` is Triangle where it is installed, else CDT.
     """
 
     size: float = 4.0
@@ -80,6 +82,7 @@ class MeshOptions:
     max_pixels: int = ReadOptions.max_pixels
     effort: str = "normal"
     threads: int = 1
+    triangulator: str = "auto"
 
     def __post_init__(self) -> None:
         if not (isfinite(self.pixel_size) and self.pixel_size > 0):
@@ -130,6 +133,7 @@ class MeshOptions:
             material_sizes=self._sizes(materials),
             effort=self.effort,
             threads=self.threads,
+            triangulator=self.triangulator,
         )
 
     def _sizes(self, materials: Materials | None) -> dict[int, float]:

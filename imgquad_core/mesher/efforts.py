@@ -12,6 +12,8 @@ from imgquad_core.arrays import Floats, Labels
 from imgquad_core.cleanup.irregular_nodes import CleanUp
 from imgquad_core.errors import InputError
 
+from .triangulation import triangulator_used
+
 STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
 
 
@@ -62,6 +64,8 @@ class MeshingOptions:
         How far irregular nodes are hunted.
     threads : int
         Number of threads; the mesh does not depend on it.
+    triangulator : {"auto", "triangle", "cdt"}
+        Who makes the Delaunay triangles that quads come from; see `triangulator_used`.
     tuning : Tuning
         For tests and studies.
     """
@@ -71,6 +75,7 @@ class MeshingOptions:
     material_sizes: Mapping[int, float] | None = field(default=None)
     effort: str = "normal"
     threads: int = 1
+    triangulator: str = "auto"
     tuning: Tuning = TUNING
 
     def __post_init__(self) -> None:
@@ -84,6 +89,7 @@ class MeshingOptions:
             raise InputError(f"effort is {self.effort!r}; give one of {', '.join(EFFORTS)}")
         if self.threads < 1:
             raise InputError(f"threads is {self.threads}; give at least 1")
+        triangulator_used(self.triangulator)
 
     def _sizes(self) -> Mapping[int, float]:
         return self.material_sizes or {}

@@ -59,13 +59,14 @@ def faces_of(parts: list[FaceQuads], faces: Flags) -> list[FaceQuads]:
     return [kept for part in parts if len((kept := faces_only(part, faces)).quads)]
 
 
-def consistent(graph: BoundaryGraph, new: Flags) -> BoundaryGraph:
+def consistent(graph: BoundaryGraph, new: Flags, triangulator: str) -> BoundaryGraph:
     """Return the graph, with finer chains where coarse outlines of the new ones contradict each other or others."""
     for _ in range(CONTRADICTIONS):
         bad = chains_in_conflict(graph, coarse_segments(graph, np.ones(graph.n_chains, bool), 2), new)
         if not bad.any():
             flat = outline(graph, faces_beside(graph, new), 2)
-            cut = cut_at_constraints(triangulate(flat.points, flat.segments), flat.constraints)
+            mesh = triangulate(flat.points, flat.segments, triangulator=triangulator)
+            cut = cut_at_constraints(mesh, flat.constraints)
             if not isinstance(cut, FaceConflict):
                 return graph
             faces = np.zeros(len(graph.region_label), bool)
@@ -141,10 +142,11 @@ def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOp
     """Triangulate faces, place points in layers, compose the triangles and split all to quads."""
     sizes = options.face_sizes(graph.region_label) * stride
     flat = outline(graph, faces, stride)
-    cut = _cut(triangulate(flat.points, flat.segments, BACKGROUND_AREA * float(sizes[faces].max()) ** 2), flat)
+    largest = BACKGROUND_AREA * float(sizes[faces].max()) ** 2
+    cut = _cut(triangulate(flat.points, flat.segments, largest, options.triangulator), flat)
     field = cross_field(cut, _largest_sizes(cut, sizes), options.slope)
     points = np.vstack([flat.points, frontal_points(cut, field)])
-    cut = _cut(triangulate(points, flat.segments), flat)
+    cut = _cut(triangulate(points, flat.segments, triangulator=options.triangulator), flat)
     quads = split_composed(cut, compose(cut), len(flat.ids))
     n = len(cut.points)
     origin = quads.origin.copy()

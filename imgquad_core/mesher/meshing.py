@@ -58,7 +58,8 @@ def mesh_boundaries(
     """
     ahead.start()
     options = options or MeshingOptions()
-    graph = with_short_chains_halved(consistent(graph, np.ones(graph.n_chains, bool)), LEAST_WIDTH)
+    graph = consistent(graph, np.ones(graph.n_chains, bool), options.triangulator)
+    graph = with_short_chains_halved(graph, LEAST_WIDTH)
     state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options))
     state = with_musts(with_wishes(state, options), options)
     mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))

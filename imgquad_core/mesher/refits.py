@@ -67,7 +67,7 @@ def _refitted(state: State, finer: BoundaryGraph, options: MeshingOptions) -> St
     Where quads fold, the new state is kept in any case.
     """
     graph, meshed = state
-    finer = consistent(finer, _differ(graph, finer))
+    finer = consistent(finer, _differ(graph, finer), options.triangulator)
     changed = _differ(graph, finer)
     todo = faces_beside(graph, changed)
     done = mesh_faces(finer, todo, options)
