@@ -15,6 +15,10 @@ _COLORS = (
     "how colours become materials: each its own (exact), quantised to N, the nearest of '#rrggbb,#rrggbb,...', or "
     "auto: exact up to 32 colours, else a number that the report states (default: auto)"
 )
+_TRIANGULATOR = (
+    "who makes the triangles that quads come from: Triangle (not for commercial use), CDT, or auto: Triangle where it "
+    "is installed, else CDT (default: auto)"
+)
 _MIN_PIXELS = "remove clusters of fewer than N pixels ... (default: auto, which is 0 for label pictures; 0: none)"
 
 
@@ -45,6 +49,7 @@ def add_mesh_options(parser: argparse.ArgumentParser) -> None:
     add("--pixel-size", type=float, metavar="L", help="length of a pixel in the unit of the mesh (default: 1)")
     add("--effort", choices=("fast", "normal", "best"), help="how far the mesh is optimised (default: normal)")
     add("--periodic", choices=("none", "x", "y", "xy"), help="match the nodes of opposite sides, for a periodic cell")
+    add("--triangulator", choices=("auto", "triangle", "cdt"), help=_TRIANGULATOR)
     add("--threads", type=int, metavar="N", help="threads of the meshing stage (default: 1)")
 
 

@@ -17,6 +17,7 @@ Auto: TypeAlias = Literal["auto"]
 Unit: TypeAlias = Literal["pixels", "world"]
 Policy: TypeAlias = Literal["minority", "majority", "lower", "diagonal", "junction"]
 Periodic: TypeAlias = Literal["none", "x", "y", "xy"]
+Triangulator: TypeAlias = Literal["auto", "triangle", "cdt"]
 Colors: TypeAlias = "Literal['auto', 'exact'] | int | Sequence[Sequence[int]]"
 MaterialSizes: TypeAlias = "Mapping[str | int, float] | None"
 
@@ -205,6 +206,7 @@ def mesh(
     periodic: Periodic = "none",
     effort: Effort = "normal",
     threads: int = 1,
+    triangulator: Triangulator = "auto",
     unit: Unit = "pixels",
     sample: str | Sequence[str] = (),
     progress_bar: bool = False,
@@ -246,6 +248,9 @@ def mesh(
         How far the mesh is optimised.
     threads : int, default: 1
         Number of threads of the meshing stage; the mesh does not depend on it.
+    triangulator : "auto" | "triangle" | "cdt", default: "auto"
+        Who makes the Delaunay triangles that quads come from: Triangle (not for commercial use), CDT, or ``auto``:
+        Triangle where it is installed, else CDT.
     unit : "pixels" | "world", default: "pixels"
         Unit of all sizes: sides of pixels (the shorter ones where they differ), or the unit of the image's spacing.
     sample : str | sequence, optional
@@ -295,7 +300,7 @@ def mesh(
 
     sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
     values = checked(growth=growth, policy=policy, edge_ratio=edge_ratio, max_shift=max_shift, effort=effort)
-    values |= checked(threads=threads, periodic=periodic)
+    values |= checked(threads=threads, triangulator=triangulator, periodic=periodic)
     early = checked(colors=colors, drop_transparent=drop_transparent)
     last = checked(drop=drop, sample=sample)
     placement = image_placement(image, scalars)

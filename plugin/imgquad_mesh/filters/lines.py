@@ -10,7 +10,7 @@ from imgquad_core.errors import InputError
 from imgquad_mesh.progress import progress_of
 
 from .grids import Effort
-from .images import MaterialSizes, Periodic, Unit, _in_pixels, _numbered
+from .images import MaterialSizes, Periodic, Triangulator, Unit, _in_pixels, _numbered
 
 
 def smooth(
@@ -89,6 +89,7 @@ def quads(
     growth: float | None = None,
     effort: Effort = "normal",
     threads: int = 1,
+    triangulator: Triangulator = "auto",
     unit: Unit = "pixels",
     progress_bar: bool = False,
 ) -> pv.UnstructuredGrid:
@@ -108,6 +109,8 @@ def quads(
         How far the mesh is optimised.
     threads : int, default: 1
         Number of threads; the mesh does not depend on it.
+    triangulator : "auto" | "triangle" | "cdt", default: "auto"
+        Who makes the Delaunay triangles that quads come from, see `mesh`.
     unit : "pixels" | "world", default: "pixels"
         Unit of the sizes, see `smooth`.
     progress_bar : bool, default: False
@@ -133,7 +136,8 @@ def quads(
     sizes = checked(**{name: value for name, value in asked.items() if value is not None})
     values |= _in_pixels(sizes, unit, given.placement.pixel_size)
     values["material_sizes"] = _numbered(values["material_sizes"], given.materials)
-    values |= checked(effort=effort, threads=threads) | ({} if growth is None else checked(growth=growth))
+    values |= checked(effort=effort, threads=threads, triangulator=triangulator)
+    values |= {} if growth is None else checked(growth=growth)
     options = MeshingOptions(**values)
     with progress_of(progress_bar) as begin:
         begin("mesh")

@@ -26,6 +26,7 @@ from imgquad_core.measures.quality import (
 )
 from imgquad_core.mesher.efforts import MeshingOptions
 from imgquad_core.mesher.meshing import mesh_boundaries
+from imgquad_core.mesher.triangulation import triangulator_used
 from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.picture.noise import DenoiseOptions, list_removed, remove_noise
@@ -177,14 +178,14 @@ def _mesh_boundary(state: State, options: MeshingOptions) -> dict[str, Any]:
     assert state.boundary is not None
     mesh = mesh_boundaries(state.boundary, _numbered(options, state), _labels(state).materials)
     state.put_mesh(mesh)
-    return _size_of(mesh)
+    return _size_of(mesh) | {"triangulator": triangulator_used(options.triangulator)}
 
 
 def _mesh_image(state: State, options: MeshOptions) -> dict[str, Any]:
     done = run(state.labels if state.labels is not None else state.need_image(), options)
     state.labels, state.pixel_boundary, state.boundary = done.labels, done.pixel_boundary, done.boundary
     state.put_mesh(done.mesh)
-    return _size_of(done.mesh)
+    return _size_of(done.mesh) | {"triangulator": triangulator_used(options.triangulator)}
 
 
 def _optimize(state: State, options: OptimizationOptions) -> dict[str, Any]:

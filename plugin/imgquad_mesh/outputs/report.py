@@ -15,13 +15,14 @@ import numpy as np
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.measures.quality import bad_places, forced_quads, quality_report, scaled_jacobian
+from imgquad_core.mesher.triangulation import triangulator_used
 from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.pipeline import thin_features
 
 if TYPE_CHECKING:
     from imgquad_core.pipeline import Run
 
-PACKAGES = ("imgquad-mesh", "numpy", "scipy", "numba", "scikit-image", "triangle", "pyvista", "vtk")
+PACKAGES = ("imgquad-mesh", "numpy", "scipy", "numba", "scikit-image", "triangle", "pythoncdt", "pyvista", "vtk")
 LOW = 0.3  #: scaled Jacobian below which Verdict calls a quad bad; counted in every report
 
 
@@ -80,7 +81,11 @@ def peak_memory_mb() -> float | None:
 
 def _options(run: Run) -> dict[str, Any]:
     values = {f.name: getattr(run.options, f.name) for f in fields(run.options)}
-    used = {"min_pixels": run.noise.min_pixels, "min_length": run.noise.min_length}
+    used = {
+        "min_pixels": run.noise.min_pixels,
+        "min_length": run.noise.min_length,
+        "triangulator": triangulator_used(run.options.triangulator),
+    }
     sizes = {str(name): size for name, size in run.options.material_sizes.items()}
     return values | used | {"material_sizes": sizes}
 
