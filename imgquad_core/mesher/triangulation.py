@@ -117,7 +117,7 @@ def triangulate(points: Floats, segments: Ints, max_area: float | None = None, t
     points : float64, shape (n, 2)
         Distinct points.
     segments : int64, shape (m, 2)
-        Ints of the ends; no two cross, touch or overlap. None of them is ever split.
+        Ids of the ends; no two cross, touch or overlap. None of them is ever split.
     max_area : float, optional
         Adds points inside, until triangles far from the constraints are hardly larger; towards short constraints they
         get smaller step by step.
