@@ -76,7 +76,7 @@ class MeshingOptions:
     effort: str = "normal"
     threads: int = 1
     triangulator: str = "auto"
-    tuning: Tuning = TUNING
+    tuning: Tuning = field(default=TUNING, metadata={"internal": True})  # no user's business: no filter has it
 
     def __post_init__(self) -> None:
         sizes = {"size": self.size} | {f"size of material {k}": v for k, v in self._sizes().items()}

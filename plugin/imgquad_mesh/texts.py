@@ -177,6 +177,8 @@ def values_of(options: Any, spec: Filter) -> dict[str, Value]:
     """Return the values of a filter's parameters, by field name, that give these options in `options_from`."""
     values: dict[str, Value] = {}
     for option in fields(options):
+        if option.metadata.get("internal"):
+            continue
         parameter = spec.parameter(option.name)
         value = getattr(options, option.name)
         if parameter is None:
