@@ -148,6 +148,7 @@ def test_an_option_on_one_side_only_is_found() -> None:
     @dataclass(frozen=True)
     class Less:
         min_pixels: int = 0
+        policy: str = "minority"
 
     spec = filters()["apply_label_noise_removal_per_pixel"]
     assert differences(spec, Less) == ["min_length is in filters.xml only"]
