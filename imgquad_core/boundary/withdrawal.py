@@ -22,15 +22,23 @@ from .curves import Curves, Ends, per_point, pin_ends
 from .edge_sizes import grade_along, grade_chains
 from .nodes import Level, Nodes, any_of_chain, even_out, level_of, mark_conflicts, number_nodes, place_nodes, points_at
 
-_GENTLE_ROUNDS = 8  # that mind sectors and room; later ones only crossings
-_ROUNDS = 14  # until chains with crossings get their pixels back, and
-_LAST_ROUNDS = 6  # more until all chains do
-_PATIENCE = 2  # rounds that only place nodes closer together, unless a sector is too sharp
 _CLOSER, _LESS_CLOSE = 0.6, 0.8  # factors on the wanted length, at crossings and at sharp sectors
 _CLOSEST = 0.25  # px between nodes, and no less
 _AREA_ROOM = 0.7  # of the bound of smoothing, for the shift that restores areas
 _AREA_ROUNDS = 10
 _KINK = 0.3  # by how much the shift for areas may change along a chain, over the length
+
+
+class Patience(NamedTuple):
+    """After how many rounds what is given up: handed down, so that a test can ask for less."""
+
+    closer: int = 2  #: rounds that only place nodes closer together, unless a sector is too sharp
+    gentle: int = 8  #: rounds that mind sectors and room; later ones mind crossings only
+    curved: int = 14  #: rounds after which chains with crossings get their pixels back
+    most: int = 20  #: rounds after which all chains do
+
+
+PATIENCE = Patience()
 
 
 class Draft(NamedTuple):
@@ -47,7 +55,7 @@ class Draft(NamedTuple):
     shape: tuple[int, int]
 
 
-def place_freely(draft: Draft, size: Floats) -> tuple[Nodes, bool]:
+def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> tuple[Nodes, bool]:
     """Place nodes without conflicts.
 
     Parameters
@@ -56,6 +64,8 @@ def place_freely(draft: Draft, size: Floats) -> tuple[Nodes, bool]:
         The curves.
     size : float64, shape (n,)
         Wanted length of final edges at each dense point.
+    patience : Patience, optional
+        Rounds.
 
     Returns
     -------
@@ -68,18 +78,18 @@ def place_freely(draft: Draft, size: Floats) -> tuple[Nodes, bool]:
     at_least = _least_segments(curves.ends)
     size, withdrawn = size.copy(), np.zeros(len(size))
     exact, is_new = np.zeros(len(curves.ends), bool), np.ones(len(curves.ends), bool)
-    for attempt in range(_ROUNDS + _LAST_ROUNDS + 2):
-        gently = attempt < _GENTLE_ROUNDS
+    for attempt in range(patience.most + 2):
+        gently = attempt < patience.gentle
         nodes = _place(draft, size, at_least, exact, withdrawn)
         factor, pull = np.ones(len(size)), np.zeros(len(size))
         for level in (level_of(nodes, 2), level_of(nodes, 1)):
             marks = mark_conflicts(nodes.points, level, draft.ends, is_new, gently, draft.shape)
-            _mark_dense(marks, level, curves.offsets, attempt >= _PATIENCE, factor, pull)
+            _mark_dense(marks, level, curves.offsets, attempt >= patience.closer, factor, pull)
         if factor.min() == 1.0:
             return nodes, gently
         failed = any_of_chain(factor < 1.0, curves.offsets)
-        if attempt >= _ROUNDS:
-            exact |= failed | (attempt >= _ROUNDS + _LAST_ROUNDS)
+        if attempt >= patience.curved:
+            exact |= failed | (attempt >= patience.most)
         shorter = np.maximum(size * factor, np.minimum(_CLOSEST, draft.limit))
         shorter = grade_chains(shorter, curves, len(draft.node), draft.edge_ratio)
         failed |= any_of_chain(shorter < size, curves.offsets)

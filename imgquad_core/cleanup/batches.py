@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -14,14 +14,25 @@ from .faces import FaceQuads, taken_out
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
-BATCH = 3000  # quads, so that a batch stays in the cache
-LARGEST = 3 * BATCH  # quads of a face that shares its batch with others
 TILE = 8  # edge lengths; quads of a batch are numbered tile by tile
 
 
-def in_batches(mesh: FaceQuads, work: Callable[[FaceQuads], Result], threads: int) -> list[Result]:
+class Portions(NamedTuple):
+    """How large the parts of a mesh are that threads share: handed down, so that a test can ask for small ones."""
+
+    batch: int = 3000  #: quads of a batch, so that it stays in the cache
+    largest: int = 9000  #: quads of a face that shares its batch with others
+    strip: int = 64  #: quads across a strip of a larger face, about: many times a cavity
+
+
+PORTIONS = Portions()
+
+
+def in_batches(
+    mesh: FaceQuads, work: Callable[[FaceQuads], Result], threads: int, portions: Portions = PORTIONS
+) -> list[Result]:
     """Call `work` for groups of whole faces; the results come in the order of the batches, whatever the threads."""
-    return in_threads(batches_of(mesh), work, threads)
+    return in_threads(batches_of(mesh, portions), work, threads)
 
 
 def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) -> list[Result]:
@@ -32,12 +43,12 @@ def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) 
         return list(pool.map(work, parts))
 
 
-def batches_of(mesh: FaceQuads) -> list[FaceQuads]:
-    """Cut the mesh into groups of neighbouring faces (by number) of about `BATCH` quads, and faces that are large."""
+def batches_of(mesh: FaceQuads, portions: Portions = PORTIONS) -> list[FaceQuads]:
+    """Cut the mesh into groups of neighbouring faces (by number) of about a batch, and faces that are large."""
     if len(mesh.quads) == 0:
         return []
     per_face = np.bincount(mesh.face)
-    nth, alone = (np.cumsum(per_face) - per_face) // BATCH, per_face > LARGEST
+    nth, alone = (np.cumsum(per_face) - per_face) // portions.batch, per_face > portions.largest
     begins = (np.diff(nth, prepend=0) > 0) | alone
     begins[1:] |= alone[:-1]
     batch = np.cumsum(begins)[mesh.face]
@@ -47,9 +58,9 @@ def batches_of(mesh: FaceQuads) -> list[FaceQuads]:
     return [taken_out(mesh, chosen, new)[0] for chosen in np.split(order, ends)]
 
 
-def is_large(batch: FaceQuads) -> bool:
+def is_large(batch: FaceQuads, portions: Portions) -> bool:
     """Whether a batch is one large face."""
-    return len(batch.quads) > LARGEST and bool((batch.face == batch.face[0]).all())
+    return len(batch.quads) > portions.largest and bool((batch.face == batch.face[0]).all())
 
 
 def _tile(mesh: FaceQuads) -> Ints:

@@ -19,19 +19,18 @@ import numpy as np
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.jit import kernel
 
-from .batches import in_threads
+from .batches import PORTIONS, Portions, in_threads
 from .faces import FaceQuads, taken_out
 
-WIDTH = 64  # quads across a strip, about: many times a cavity
 LEFT_ALONE = -1  # number of the piece that is not worked on
 
 
-def strips_of(points: Floats, quads: Ints, shifted: bool = False) -> Ints:
+def strips_of(points: Floats, quads: Ints, portions: Portions = PORTIONS, *, shifted: bool = False) -> Ints:
     """Return the number of the strip of each quad; the shifted cut has its seams half-way between the others."""
     extent = np.ptp(points, axis=0)
     along = int(extent[1] > extent[0])
     place = (points[quads[:, 0], along] - points[:, along].min()) / extent[along]
-    count = max(2, round(np.sqrt(len(quads) * extent[along] / extent[1 - along]) / WIDTH))
+    count = max(2, round(np.sqrt(len(quads) * extent[along] / extent[1 - along]) / portions.strip))
     return np.asarray(np.minimum(count * place, count - 1e-9) + 0.5 * shifted, np.int64)
 
 

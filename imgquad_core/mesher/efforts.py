@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Floats, Labels
+from imgquad_core.cleanup.batches import PORTIONS, Portions
 from imgquad_core.cleanup.irregular_nodes import CleanUp
 from imgquad_core.errors import InputError
 
@@ -43,6 +44,7 @@ class Tuning(NamedTuple):
     wishes: int = 3  #: rounds of halving for the sake of poor quads, at most
     rounds: int = 16  #: rounds of halving in all, at most: those after the wishes are for folded quads
     very_wide: float = 6.0  #: width of a face that is meshed on stride 6, in its coarse segments
+    portions: Portions = PORTIONS  #: parts that threads share
 
 
 TUNING = Tuning()

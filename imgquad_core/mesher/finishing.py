@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats
-from imgquad_core.cleanup.batches import in_threads, is_large
+from imgquad_core.cleanup.batches import Portions, in_threads, is_large
 from imgquad_core.cleanup.faces import INNER_VALENCE, FaceQuads, wanted_quads
 from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
 from imgquad_core.cleanup.relaxation import BAD, GOOD, Rings, fit_rim, laplace, newton, rings_of, untangle
@@ -29,7 +29,13 @@ POOR = 0.7  # scaled Jacobian below which single quads are replaced
 
 
 def finished(
-    batches: list[FaceQuads], targets: Floats, across: int, rim: Constraints, how: CleanUp, threads: int
+    batches: list[FaceQuads],
+    targets: Floats,
+    across: int,
+    rim: Constraints,
+    how: CleanUp,
+    threads: int,
+    portions: Portions,
 ) -> list[FaceQuads]:
     """Turn composed quads into the final ones of their faces, batch by batch.
 
@@ -47,6 +53,8 @@ def finished(
         How far the clean-up goes.
     threads : int
         Number of threads; the quads do not depend on it.
+    portions : Portions
+        Which faces are large, and how wide their strips are.
     """
 
     def whole(part: FaceQuads) -> FaceQuads:
@@ -56,14 +64,14 @@ def finished(
         return _without_poor(_relaxed(_fitted(part, targets, True), *last))
 
     def large(part: FaceQuads) -> FaceQuads:
-        part = _cleaned_in_pieces(_fitted(part, targets, False), how, threads)
+        part = _cleaned_in_pieces(_fitted(part, targets, False), how, threads, portions)
         if across > 1:
-            part = _split(_relaxed_in_pieces(part, *FULL, threads), rim, across)
-        return _relaxed_in_pieces(_fitted(part, targets, True), *last, threads)
+            part = _split(_relaxed_in_pieces(part, *FULL, threads, portions), rim, across)
+        return _relaxed_in_pieces(_fitted(part, targets, True), *last, threads, portions)
 
     last = FULL if across == 1 else AGAIN
-    small = in_threads([part for part in batches if not is_large(part)], whole, threads)
-    single = [large(part) for part in batches if is_large(part)]
+    small = in_threads([part for part in batches if not is_large(part, portions)], whole, threads)
+    single = [large(part) for part in batches if is_large(part, portions)]
     return [*small, *in_threads(single, _without_poor, threads)]
 
 
@@ -73,20 +81,22 @@ def _split(part: FaceQuads, rim: Constraints, across: int) -> FaceQuads:
     return split_quads(part, twins, points_between(part.quads, twins, part.origin, rim, across))
 
 
-def _cleaned_in_pieces(face: FaceQuads, how: CleanUp, threads: int) -> FaceQuads:
+def _cleaned_in_pieces(face: FaceQuads, how: CleanUp, threads: int, portions: Portions) -> FaceQuads:
     """Smooth and clean up one large face in strips, then in bands around the seams."""
-    strip = strips_of(face.points, face.quads)
+    strip = strips_of(face.points, face.quads, portions)
     face, seams = in_pieces(face, strip, lambda part, _: clean_up(_relaxed(part, *DRAFT), how), threads)
     near = nodes_around(face.quads, seams, RETRIED)
     in_band = nodes_around(face.quads, near, ROOM)[face.quads].any(axis=1)
-    band = np.where(in_band, strips_of(face.points, face.quads, True), LEFT_ALONE)
+    band = np.where(in_band, strips_of(face.points, face.quads, portions, shifted=True), LEFT_ALONE)
     return in_pieces(face, band, lambda part, ids: clean_up(_relaxed(part, *DRAFT), how, near[ids]), threads)[0]
 
 
-def _relaxed_in_pieces(face: FaceQuads, laplace_sweeps: int, newton_sweeps: int, threads: int) -> FaceQuads:
+def _relaxed_in_pieces(
+    face: FaceQuads, laplace_sweeps: int, newton_sweeps: int, threads: int, portions: Portions
+) -> FaceQuads:
     """Smooth the nodes inside one large face in strips, then those around the seams."""
     points, rings, free = face.points.copy(), rings_of(face.quads, len(face.points)), face.origin < 0
-    groups, seams = independent_nodes(strips_of(points, face.quads), face.quads, len(points), threads)
+    groups, seams = independent_nodes(strips_of(points, face.quads, portions), face.quads, len(points), threads)
     near = nodes_around(face.quads, seams, REACH)
     in_threads(groups, lambda nodes: _relax(points, rings, free & nodes, laplace_sweeps, newton_sweeps), threads)
     _relax(points, rings, free & near, laplace_sweeps, newton_sweeps)

@@ -118,14 +118,17 @@ def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, o
     worst = np.ones(len(faces))
     if not faces.any():
         return Meshed([], faces, worst)
+    portions = options.tuning.portions
     groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
-    composed = in_threads(groups, lambda group: batches_of(_compose(graph, group, stride, options)), options.threads)
+    composed = in_threads(
+        groups, lambda group: batches_of(_compose(graph, group, stride, options), portions), options.threads
+    )
     ahead.wait()
     rim = coarse_segments(graph, chains_of(graph, faces), stride // 2)  # the Catmull-Clark split has halved edges
     nothing = np.zeros(len(rim.tail), np.int64)
     table = constraint_table(len(graph.points), rim.tail, rim.head, nothing, nothing, rim.middle)
     batches = [batch for group in composed for batch in group]
-    parts = finished(batches, graph.points, stride // 2, table, how, options.threads)
+    parts = finished(batches, graph.points, stride // 2, table, how, options.threads, portions)
     in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.threads)
     return Meshed(parts, faces, worst)
 

@@ -16,7 +16,7 @@ import numpy as np
 from imgquad_core import ahead
 from imgquad_core.arrays import Flags, Labels
 from imgquad_core.chains import without_unused_points
-from imgquad_core.cleanup.batches import LARGEST, in_threads
+from imgquad_core.cleanup.batches import Portions, in_threads
 from imgquad_core.cleanup.faces import FaceQuads, joined
 from imgquad_core.cleanup.relaxation import GOOD, newton, rings_of, untangle
 from imgquad_core.cleanup.sliding import slide
@@ -63,7 +63,7 @@ def mesh_boundaries(
     state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options))
     state = with_musts(with_wishes(state, options), options)
     mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
-    return _slid(mesh, EFFORTS[options.effort].slides, options.threads)
+    return _slid(mesh, EFFORTS[options.effort].slides, options.threads, options.tuning.portions)
 
 
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
@@ -88,10 +88,10 @@ def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) 
     )
 
 
-def _slid(mesh: QuadMesh, rounds: int, threads: int) -> QuadMesh:
+def _slid(mesh: QuadMesh, rounds: int, threads: int, portions: Portions) -> QuadMesh:
     """Let boundary nodes slide, and the nodes inside follow."""
     points, gone = mesh.points.copy(), np.zeros(mesh.n_points)
-    rings, (groups, seams) = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads)
+    rings, (groups, seams) = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads, portions)
 
     def move(how: Callable[[Flags], object]) -> None:
         in_threads(groups, how, threads)
@@ -104,15 +104,15 @@ def _slid(mesh: QuadMesh, rounds: int, threads: int) -> QuadMesh:
     return replace(mesh, points=points)
 
 
-def _inner_nodes(mesh: QuadMesh, n_groups: int) -> tuple[list[Flags], Flags]:
+def _inner_nodes(mesh: QuadMesh, n_groups: int, portions: Portions) -> tuple[list[Flags], Flags]:
     """Return the nodes inside faces in groups that do not feel each other, and those between them.
 
     A group has whole faces or strips of large ones, whatever the number of groups.
     """
     strip, n_strips = np.zeros(mesh.n_quads, np.int64), np.ones(len(mesh.region_label), np.int64)
-    for face in np.flatnonzero(np.bincount(mesh.quad_region) > 4 * LARGEST):
+    for face in np.flatnonzero(np.bincount(mesh.quad_region) > 4 * portions.largest):
         quads = np.flatnonzero(mesh.quad_region == face)
-        strip[quads] = strips_of(mesh.points, mesh.quads[quads])
+        strip[quads] = strips_of(mesh.points, mesh.quads[quads], portions)
         n_strips[face] = strip[quads].max() + 1
     piece = (np.cumsum(n_strips) - n_strips)[mesh.quad_region] + strip
     groups, seams = independent_nodes(piece, mesh.quads, mesh.n_points, n_groups)

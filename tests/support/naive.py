@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
@@ -85,3 +86,49 @@ def shape_energy(points: Points, quads: Ids, power: int = 4) -> float:
     if (det <= 0).any():
         return float("inf")
     return float(((((a**2).sum(-1) + (b**2).sum(-1)) / (2 * det)) ** power).sum())
+
+
+def segments_meet(p: Any, q: Any, r: Any, s: Any) -> bool:
+    """Whether the segments p q and r s (of whole numbers, none without length) have a point in common: fractions."""
+    (ux, uy), (vx, vy), (wx, wy) = (
+        [int(b) - int(a) for a, b in zip(*pair, strict=True)] for pair in ((p, q), (r, s), (p, r))
+    )
+    det = ux * vy - uy * vx
+    if det == 0:
+        return any(is_on(x, r, s) for x in (p, q)) or any(is_on(x, p, q) for x in (r, s))
+    t, k = Fraction(wx * vy - wy * vx, det), Fraction(wx * uy - wy * ux, det)
+    return 0 <= t <= 1 and 0 <= k <= 1
+
+
+def is_on(x: Any, p: Any, q: Any) -> bool:
+    """Whether a point of whole numbers lies on the segment p q."""
+    (ux, uy), (wx, wy) = ([int(b) - int(a) for a, b in zip(p, end, strict=True)] for end in (q, x))
+    return ux * wy == uy * wx and 0 <= ux * wx + uy * wy <= ux * ux + uy * uy
+
+
+def distance(x: Points, p: Points, q: Points) -> float:
+    """Distance of a point from the segment p q."""
+    t = np.clip((x - p) @ (q - p) / ((q - p) @ (q - p)), 0.0, 1.0)
+    return float(np.linalg.norm(x - p - t * (q - p)))
+
+
+def arc_between(curves: Any, i: int, j: int) -> float:
+    """Shortest way along the curves from dense point i to j: along one chain, or round one node that two share."""
+    c, d = (int(np.searchsorted(curves.offsets, k, side="right")) - 1 for k in (i, j))
+
+    def to_ends(chain: int, k: int) -> dict[int, list[float]]:
+        ways: dict[int, list[float]] = defaultdict(list)
+        for node, way in zip(
+            curves.ends[chain], (curves.arc[k], curves.arc[curves.offsets[chain + 1] - 1] - curves.arc[k]), strict=True
+        ):
+            ways[int(node)].append(way)
+        return ways
+
+    ways = [abs(curves.arc[i] - curves.arc[j])] if c == d else []
+    if curves.ends[c, 0] < 0 or curves.ends[d, 0] < 0:
+        if c == d:
+            ways.append(curves.arc[curves.offsets[c + 1] - 1] - ways[0])
+    else:
+        there, here = to_ends(c, i), to_ends(d, j)
+        ways += [a + b for node in there.keys() & here.keys() for a in there[node] for b in here[node]]
+    return min(ways, default=np.inf)

@@ -90,11 +90,8 @@ def test_a_window_with_two_samples_leaves_its_point() -> None:
 
 @pytest.mark.parametrize("size", [0.4, 3.0])
 @pytest.mark.parametrize("rounds", [14, 0])
-def test_hopeless_curves_fall_back_to_the_pixel_boundary(
-    size: float, rounds: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(withdrawal, "_ROUNDS", rounds)
-    monkeypatch.setattr(withdrawal, "_GENTLE_ROUNDS", min(rounds, 8))
+def test_hopeless_curves_fall_back_to_the_pixel_boundary(size: float, rounds: int) -> None:
+    patience = withdrawal.Patience(gentle=min(rounds, 8), curved=rounds, most=rounds + 6)
     raw = extract_boundaries(label_image(np.random.default_rng(8).integers(0, 3, (14, 14))))
     curves, ends = curves_of(raw)
     wild = curves.raw + np.random.default_rng(1).normal(0.0, 2.0, curves.raw.shape)
@@ -102,7 +99,7 @@ def test_hopeless_curves_fall_back_to_the_pixel_boundary(
     wild[per_point(curves, curves.is_frame)] = curves.raw[per_point(curves, curves.is_frame)]
     limit, nowhere = np.full(len(wild), size), np.zeros(len(wild), bool)
     draft = withdrawal.Draft(curves, ends, wild, ends.place, nowhere, limit, 1.2, False, raw.shape)
-    nodes, _ = withdrawal.place_freely(draft, limit)
+    nodes, _ = withdrawal.place_freely(draft, limit, patience)
     graph = replace(
         raw,
         points=nodes.points,

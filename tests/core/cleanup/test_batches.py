@@ -7,17 +7,17 @@ import threading
 import numpy as np
 import pytest
 
-from imgquad_core.cleanup import batches
-from imgquad_core.cleanup.batches import in_batches
+from imgquad_core.cleanup.batches import Portions, in_batches
 from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
 from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
 from support.faces import areas, assert_valid_faces, quads_of, voronoi_graph
 
+SMALL = Portions(batch=150)
+
 
 @pytest.fixture
-def grains(monkeypatch: pytest.MonkeyPatch) -> FaceQuads:
-    """Sixteen grains in several batches."""
-    monkeypatch.setattr(batches, "BATCH", 150)
+def grains() -> FaceQuads:
+    """Sixteen grains, in several small batches."""
     return quads_of(voronoi_graph(64, 4, 2.0, 0), 2.0)
 
 
@@ -28,7 +28,7 @@ def corners(mesh: FaceQuads) -> set[tuple[int, tuple[tuple[float, float], ...]]]
 
 
 def test_batches_hold_whole_faces_and_together_all(grains: FaceQuads) -> None:
-    parts = in_batches(grains, lambda part: part, 1)
+    parts = in_batches(grains, lambda part: part, 1, SMALL)
     assert len(parts) > 3
     faces = [set(part.face.tolist()) for part in parts]
     assert sum(map(len, faces)) == len(set().union(*faces)) == 16
@@ -45,7 +45,7 @@ def test_threads_do_not_change_a_byte(grains: FaceQuads, threads: int) -> None:
     def work(part: FaceQuads) -> FaceQuads:
         return clean_up(part, CleanUp((16, 40), 0.2, 0.6))
 
-    alone, together = joined(in_batches(grains, work, 1)), joined(in_batches(grains, work, threads))
+    alone, together = joined(in_batches(grains, work, 1, SMALL)), joined(in_batches(grains, work, threads, SMALL))
     assert all(a.tobytes() == b.tobytes() for a, b in zip(alone, together, strict=True))
     assert len(alone.quads) != len(grains.quads)
 
@@ -60,7 +60,7 @@ def test_two_batches_are_worked_on_at_once(grains: FaceQuads) -> None:
             meet.wait()  # breaks unless another thread comes here too
         return len(part.quads)
 
-    assert sum(in_batches(grains, work, 2)) == len(grains.quads)
+    assert sum(in_batches(grains, work, 2, SMALL)) == len(grains.quads)
 
 
 def test_errors_in_threads_come_through(grains: FaceQuads) -> None:
@@ -68,7 +68,7 @@ def test_errors_in_threads_come_through(grains: FaceQuads) -> None:
         raise ValueError(f"{len(part.quads)} quads")
 
     with pytest.raises(ValueError, match="quads"):
-        in_batches(grains, work, 2)
+        in_batches(grains, work, 2, SMALL)
 
 
 def test_one_batch_where_all_fits() -> None:

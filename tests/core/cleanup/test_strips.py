@@ -10,12 +10,12 @@ import pytest
 
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
-from imgquad_core.cleanup import batches, strips
+from imgquad_core.cleanup.batches import Portions
 from imgquad_core.cleanup.faces import INNER_VALENCE, FaceQuads
 from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
 from imgquad_core.cleanup.strips import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
 from imgquad_core.measures.quality import quality_report
-from imgquad_core.mesher.efforts import MeshingOptions
+from imgquad_core.mesher.efforts import MeshingOptions, Tuning
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import LabelImage
 from support.faces import areas, assert_valid_faces, grid, polygon_graph, quads_of, valences
@@ -25,16 +25,18 @@ from support.labels import label_image, labels_of_kind, pixel_centres
 Ids = np.ndarray[tuple[int], np.dtype[np.int64]]
 
 
+NARROW = Portions(strip=8)
+
+
 @pytest.fixture
-def face(monkeypatch: pytest.MonkeyPatch) -> FaceQuads:
+def face() -> FaceQuads:
     """Return a hexagon of unstructured quads, wide enough for some strips of eight quads."""
-    monkeypatch.setattr(strips, "WIDTH", 8)
     corners = [(60 + 58 * np.cos(a), 60 + 58 * np.sin(a)) for a in np.arange(6) * np.pi / 3]
     return quads_of(polygon_graph(corners, [24] * 6, (120, 120)), 2.4)
 
 
 def cut(mesh: FaceQuads, shifted: bool = False) -> Ids:
-    return strips_of(mesh.points, mesh.quads, shifted)
+    return strips_of(mesh.points, mesh.quads, NARROW, shifted=shifted)
 
 
 @pytest.mark.parametrize("shifted", [False, True])
@@ -164,15 +166,14 @@ def matrix() -> LabelImage:
     return label_image(labels)
 
 
-def test_a_matrix_in_pieces_has_no_scar(matrix: LabelImage, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_matrix_in_pieces_has_no_scar(matrix: LabelImage) -> None:
     graph = smooth_boundaries(extract_boundaries(matrix), SmoothingOptions(size=2.0))
     options = MeshingOptions(size=2.0)
     one, two = (mesh_boundaries(graph, replace(options, threads=n)) for n in (1, 2))
     assert one.points.tobytes() == two.points.tobytes()
     assert one.quads.tobytes() == two.quads.tobytes()
     assert_valid_mesh(one, matrix)
-    monkeypatch.setattr(batches, "LARGEST", 10**9)
-    whole = mesh_boundaries(graph, options)
+    whole = mesh_boundaries(graph, replace(options, tuning=Tuning(portions=Portions(largest=10**9))))
     assert whole.quads.tobytes() != one.quads.tobytes()
     ours, theirs = quality_report(one), quality_report(whole)
     assert ours.irregular < 1.08 * theirs.irregular
@@ -182,9 +183,8 @@ def test_a_matrix_in_pieces_has_no_scar(matrix: LabelImage, monkeypatch: pytest.
 
 
 @pytest.mark.parametrize("kind", ["noise", "checkerboard", "speckled", "void"])
-def test_narrow_strips_leave_any_picture_valid(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(batches, "LARGEST", 30)
-    monkeypatch.setattr(strips, "WIDTH", 4)
+def test_narrow_strips_leave_any_picture_valid(kind: str) -> None:
+    narrow = Tuning(portions=Portions(largest=30, strip=4))
     image = label_image(labels_of_kind(kind, 24, 28, 3, 7))
     graph = smooth_boundaries(extract_boundaries(image), SmoothingOptions(size=1.0))
-    assert_valid_mesh(mesh_boundaries(graph, MeshingOptions(size=1.0), image.materials), image)
+    assert_valid_mesh(mesh_boundaries(graph, MeshingOptions(size=1.0, tuning=narrow), image.materials), image)

@@ -11,7 +11,7 @@ import pytest
 
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
-from imgquad_core.cleanup import batches
+from imgquad_core.cleanup.batches import Portions
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.measures.quality import quality_report
 from imgquad_core.mesher import levels, meshing, refits
@@ -310,10 +310,10 @@ def test_one_row_or_column(n: int, colors: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_same_bytes_each_time_and_for_any_number_of_threads(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(batches, "BATCH", 300)
+def test_same_bytes_each_time_and_for_any_number_of_threads(seed: int) -> None:
+    small = Tuning(portions=Portions(batch=300))
     graph = boundaries(label_image(voronoi(90, 80, 14, seed)), 2.0)
-    one, again, two = (mesh_boundaries(graph, MeshingOptions(2.0, threads=n)) for n in (1, 1, 2))
+    one, again, two = (mesh_boundaries(graph, MeshingOptions(2.0, threads=n, tuning=small)) for n in (1, 1, 2))
     assert one.n_quads > 5 * 300
     assert same(one, again)
     assert same(one, two)
