@@ -3,7 +3,7 @@
     python benchmarks/speed.py
     python benchmarks/speed.py PICTURE.png EFFORT THREADS     one measurement of ours, as JSON
 
-Ours is `imgquad_core.meshing.mesh_boundaries` alone on compiled kernels, Gmsh's its `generate` and `refine` alone.
+Ours is `imgquad_core.mesher.mesh_boundaries` alone on compiled kernels, Gmsh's its `generate` and `refine` alone.
 """
 
 from __future__ import annotations

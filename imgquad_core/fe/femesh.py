@@ -74,7 +74,7 @@ class FEMesh:
     chain_offsets, chain_points : int64
         Boundary polylines as in `QuadMesh` (empty once nodes were split or the mesh was extruded).
     cohesive : int64, shape (n_cohesive, 4, 6 or 8)
-        Zero-thickness elements: see `imgquad_core.cohesive`. Their ids follow those of `cells`.
+        Zero-thickness elements: see `imgquad_core.fe.cohesive`. Their ids follow those of `cells`.
     cohesive_pair : int32, shape (n_cohesive, 2)
         Material below and above each of them; the normal points from the first to the second.
     periodic : mapping of str to int64 array, shape (n, 2)

@@ -92,7 +92,7 @@ def report(grid: Grid) -> dict[str, Any]:
     Returns
     -------
     dict
-        The fields of `imgquad_core.quality.QualityReport`, and under ``materials`` for each name its ``number``,
+        The fields of `imgquad_core.measures.QualityReport`, and under ``materials`` for each name its ``number``,
         ``quads``, ``regions`` and ``area`` (in the unit of the points, squared).
     """
     from dataclasses import asdict

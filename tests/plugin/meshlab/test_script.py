@@ -152,7 +152,7 @@ def test_scripts_of_ours_run_without_pymeshlab(tmp_path: Path) -> None:
     np.save(tmp_path / "labels.npy", LABELS)
     code = (
         "import sys; sys.modules['pymeshlab'] = None\n"
-        "from imgquad_mesh.script import run_script\n"
+        "from imgquad_mesh.meshlab.script import run_script\n"
         f"result = run_script({str(path)!r}, image={str(tmp_path / 'labels.npy')!r})\n"
         "assert result.values('get_quad_quality_measures')['min_sj'] > 0\n"
     )
