@@ -134,7 +134,7 @@ def segment(picture: Picture | NDArray[Any] | LabelImage, options: SegmentationO
     Quantising: a noisy picture (standard deviation of 0.5 levels or more, found from its second differences) is median
     filtered, 3 x 3 twice, which keeps edges and lines of two pixels, but not thinner ones. Rims of anti-aliasing and
     blur, up to 4 pixels to each side, are not counted in the histogram and never become a third material: each goes to
-    one of the two materials beside it (see `imgquad_core.picture.blends`). Grey is split by multi-Otsu, colours by k-means in
+    one of the two materials beside it (see `.blends`). Grey is split by multi-Otsu, colours by k-means in
     CIELAB; `auto` chooses 2 to 12 classes by the largest jump of the inverse error (`quantisation.best_count`).
     Labels of a noisy picture become the commonest of their 3 x 3 pixels. Nothing is random: the same picture gives the
     same labels.

@@ -45,7 +45,8 @@ def write_nastran(
     thickness : float
         Out of the plane.
     properties : path or mapping, optional
-        Material values: see `imgquad_core.fe.properties`. Without them MAT1 holds E = 1 and nu = 0, marked in a comment.
+        Material values: see `imgquad_core.fe.properties`. Without them MAT1 holds E = 1 and nu = 0, marked in a
+        comment.
 
     Raises
     ------

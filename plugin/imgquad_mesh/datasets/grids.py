@@ -110,7 +110,7 @@ def to_mesh(grid: pv.UnstructuredGrid | pv.PolyData) -> tuple[QuadMesh, Placemen
 
 
 def from_grid(dataset: Any, *, folded: bool = False) -> QuadMesh:
-    """Return the mesh in a flat grid of quads, the inverse of `imgquad_mesh.datasets.grids.to_grid`; see `trace_mesh`."""
+    """Return the mesh in a flat grid of quads, the inverse of `to_grid`; see `trace_mesh`."""
     from imgquad_core.tracing import trace_mesh
 
     points = np.asarray(dataset.points, np.float64)
