@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -163,9 +163,11 @@ def _by_cdt(points: Floats, segments: Ints) -> Triangles:
     import pythoncdt as cdt
 
     mesh = cdt.Triangulation(cdt.VertexInsertionOrder.AUTO, cdt.IntersectingConstraintEdges.NOT_ALLOWED, 0.0)
+    vertices: Any = np.ascontiguousarray(points, np.float64)  # a buffer, which NumPy 1's stubs do not say
+    edges: Any = np.ascontiguousarray(segments, np.uintc)
     try:
-        mesh.insert_vertices(np.ascontiguousarray(points, np.float64).data)
-        mesh.insert_edges(np.ascontiguousarray(segments, np.uintc).data)
+        mesh.insert_vertices(vertices)
+        mesh.insert_edges(edges)
     except RuntimeError as error:
         raise TopologyError(f"boundaries cross or touch: CDT says '{str(error).splitlines()[0]}'") from error
     mesh.erase_outer_triangles()

@@ -1,18 +1,27 @@
-"""The constrained Delaunay triangulation: what goes in, what is kept, what is refused."""
+"""The constrained Delaunay triangulation: what goes in, what is kept, what is refused, by whichever library."""
 
 from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from imgquad_core.errors import TopologyError
-from imgquad_core.mesher.triangulation import Triangles, constraint_table, triangulate
-from support import naive
+from imgquad_core.errors import InputError, TopologyError
+from imgquad_core.mesher import triangulation
+from imgquad_core.mesher.triangulation import Triangles, constraint_table, triangulate, triangulator_used
+from support import ROOT, naive
 from support.faces import areas, polygon_graph, voronoi_graph
 
 SQUARE = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4]])
 AROUND = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+LARGEST = {"triangle": 1.0, "cdt": 1.5}  # triangle without a corner on a constraint, over the area asked for
+needs_triangle = pytest.mark.skipif(find_spec("triangle") is None, reason="triangle is not installed")
+both = pytest.mark.parametrize("by", [pytest.param("triangle", marks=needs_triangle), "cdt"])
 
 
 def edges_of(mesh: Triangles) -> set[tuple[int, int]]:
@@ -25,11 +34,14 @@ def grains(seed: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return np.array(graph.points), graph.segments
 
 
+@both
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("max_area", [None, 6.0])
-def test_triangles_are_positive_fill_the_square_and_keep_all_segments(seed: int, max_area: float | None) -> None:
+def test_triangles_are_positive_fill_the_square_and_keep_all_segments(
+    seed: int, max_area: float | None, by: str
+) -> None:
     points, segments = grains(seed)
-    mesh = triangulate(points, segments, max_area)
+    mesh = triangulate(points, segments, max_area, by)
     assert np.array_equal(mesh.points[: len(points)], points)
     area = areas(mesh.points, mesh.triangles)
     assert area.min() > 0
@@ -40,13 +52,14 @@ def test_triangles_are_positive_fill_the_square_and_keep_all_segments(seed: int,
         assert len(mesh.points) == len(points)
     else:
         inside = (mesh.triangles >= len(points)).all(axis=1)  # elsewhere a new point might crowd a constraint
-        assert area[inside].max() <= max_area * (1 + 1e-9)
+        assert area[inside].max() <= LARGEST[by] * max_area * (1 + 1e-9)
         assert area[~inside].mean() <= max_area
 
 
-def test_no_point_lies_in_the_circle_of_a_triangle_beside_a_free_edge() -> None:
+@both
+def test_no_point_lies_in_the_circle_of_a_triangle_beside_a_free_edge(by: str) -> None:
     points, segments = grains(5)
-    mesh = triangulate(points, segments)
+    mesh = triangulate(points, segments, triangulator=by)
     fixed = {(a, b) for a, b in np.sort(segments, axis=1).tolist()}
     checked = 0
     for h in np.flatnonzero(mesh.twins >= 0):
@@ -62,9 +75,10 @@ def test_no_point_lies_in_the_circle_of_a_triangle_beside_a_free_edge() -> None:
     assert checked > 100
 
 
-def test_no_small_angles_where_refinement_may_add_points() -> None:
+@needs_triangle
+def test_no_small_angles_where_triangle_may_add_points() -> None:
     points, segments = grains(2)
-    mesh = triangulate(points, segments, 6.0)
+    mesh = triangulate(points, segments, 6.0, "triangle")
     p = mesh.points[mesh.triangles]
     a, b = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
     angle = np.degrees(np.arctan2(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], (a * b).sum(axis=-1)))
@@ -73,30 +87,55 @@ def test_no_small_angles_where_refinement_may_add_points() -> None:
     assert angle[inside].min() >= 20
 
 
-def test_hole_between_two_outlines_is_filled_and_what_lies_outside_is_not() -> None:
+@both
+@pytest.mark.parametrize("edges", [4, 16, 64])
+def test_triangles_get_larger_away_from_short_constraints(by: str, edges: int) -> None:
+    graph = polygon_graph(SQUARE * 16, [edges] * 4, (64, 64))
+    mesh = triangulate(graph.points, graph.segments, 64.0, by)
+    area, middle = areas(mesh.points, mesh.triangles), mesh.points[mesh.triangles].mean(axis=1)
+    to_rim = np.minimum(middle, 64 - middle).min(axis=1)
+    assert area[to_rim > 16].mean() >= 0.35 * 64
+    beside = area[to_rim < 0.5 * 64 / edges].mean()
+    assert beside <= (64 / edges) ** 2
+    assert len(mesh.triangles) <= 8 * (64 + 4 * edges), "finer than the sizes ask for"
+
+
+def test_cdt_adds_points_even_where_constraints_are_longer_than_the_triangles_asked_for() -> None:
+    mesh = triangulate(SQUARE, AROUND, 0.05, "cdt")
+    area = areas(mesh.points, mesh.triangles)
+    assert area.sum() == pytest.approx(16)
+    assert np.median(area) <= 0.05
+    assert (np.abs(mesh.points[4:] - 2) < 2).all()
+
+
+@both
+def test_hole_between_two_outlines_is_filled_and_what_lies_outside_is_not(by: str) -> None:
     inner = SQUARE / 2 + 1
     points = np.vstack([SQUARE, inner, [[6, 2]]])  # the last point makes a triangle on the right
     segments = np.vstack([AROUND, AROUND + 4, [[1, 8], [8, 2]]])
-    mesh = triangulate(points, segments)
+    mesh = triangulate(points, segments, triangulator=by)
     assert areas(mesh.points, mesh.triangles).sum() == pytest.approx(16 + 4)
 
 
-def test_tiny_areas_are_passed_on_without_an_exponent() -> None:
+@both
+def test_tiny_areas_are_passed_on_without_an_exponent(by: str) -> None:
     graph = polygon_graph(SQUARE / 100, [10] * 4, (1, 1))
-    mesh = triangulate(graph.points, graph.segments, 2e-5)
+    mesh = triangulate(graph.points, graph.segments, 2e-5, by)
     assert 1.6e-3 / 2e-5 <= len(mesh.triangles) < 400
 
 
-def test_same_input_gives_same_bytes() -> None:
+@both
+def test_same_input_gives_same_bytes(by: str) -> None:
     points, segments = grains(1)
-    one, two = triangulate(points, segments, 5.0), triangulate(points, segments, 5.0)
+    one, two = triangulate(points, segments, 5.0, by), triangulate(points, segments, 5.0, by)
     assert all(a.tobytes() == b.tobytes() for a, b in zip(one, two, strict=True))
 
 
+@both
 @pytest.mark.parametrize(
     ("points", "segments", "message"),
     [
-        (SQUARE, np.vstack([AROUND, [[0, 2], [1, 3]]]), "cross: Triangle added 1"),
+        (SQUARE, np.vstack([AROUND, [[0, 2], [1, 3]]]), "boundaries cross"),
         (SQUARE, AROUND[:3], "enclose nothing"),
         (np.array([[0.0, 0], [1, 0], [2, 0]]), np.array([[0, 1], [1, 2]]), "enclose nothing"),
         (SQUARE[:2], AROUND[:1], "2 points with 1 segments"),
@@ -107,10 +146,98 @@ def test_same_input_gives_same_bytes() -> None:
     ids=["crossing", "open", "collinear", "two points", "no segments", "nan", "inf"],
 )
 def test_what_encloses_no_area_or_crosses_is_refused(
-    points: NDArray[np.float64], segments: NDArray[np.int64], message: str
+    points: NDArray[np.float64], segments: NDArray[np.int64], message: str, by: str
 ) -> None:
     with pytest.raises(TopologyError, match=message):
-        triangulate(points, segments)
+        triangulate(points, segments, triangulator=by)
+
+
+def test_cdt_refuses_the_same_point_twice() -> None:
+    with pytest.raises(TopologyError, match="Duplicate vertex"):
+        triangulate(np.vstack([SQUARE, SQUARE[:1]]), AROUND, triangulator="cdt")
+
+
+@both
+def test_crossing_constraints_are_refused_with_a_background_by_cdt_too(by: str) -> None:
+    crossing = np.vstack([AROUND, [[0, 2], [1, 3]]])
+    if by == "cdt":
+        with pytest.raises(TopologyError, match="boundaries cross"):
+            triangulate(SQUARE, crossing, 1.0, by)
+    else:
+        assert len(triangulate(SQUARE, crossing, 1.0, by).points) > 4
+
+
+@both
+@pytest.mark.parametrize("step", [1e-3, 1e-9, 1e-14])
+def test_thin_faces_and_points_all_but_on_a_constraint_are_kept(by: str, step: float) -> None:
+    points = np.vstack([SQUARE, [[2.0, step], [2.0, 2.0]]])
+    mesh = triangulate(points, AROUND, triangulator=by)
+    assert set(mesh.triangles.ravel()) == set(range(6))
+    assert {(0, 1), (1, 2), (2, 3), (0, 3)} <= edges_of(mesh)
+    thin = np.array([[0.0, 0], [4, 0], [4, step], [0, step]])
+    assert len(triangulate(thin, AROUND, triangulator=by).triangles) == 2
+
+
+@both
+def test_collinear_constraints_and_a_grid_full_of_ties_are_no_trouble(by: str) -> None:
+    n = 12
+    y, x = np.divmod(np.arange(n * n), n)
+    points = np.stack([x, y], axis=1).astype(float)
+    on_frame = np.flatnonzero((x % (n - 1) == 0) | (y % (n - 1) == 0))
+    rim = on_frame[np.argsort(np.arctan2(*(points[on_frame] - (n - 1) / 2).T[::-1]))]
+    segments = np.stack([rim, np.roll(rim, -1)], axis=1)
+    mesh = triangulate(points, segments, triangulator=by)
+    assert len(mesh.triangles) == 2 * (n - 1) ** 2
+    assert np.array_equal(mesh.twins, naive.twins(mesh.triangles))
+
+
+@pytest.fixture
+def forgotten() -> Iterator[Callable[[str], None]]:
+    """Make packages look missing."""
+    triangulation._is_installed.cache_clear()
+    with pytest.MonkeyPatch.context() as patch:
+        yield lambda package: patch.setitem(sys.modules, package, None)
+    triangulation._is_installed.cache_clear()
+
+
+@needs_triangle
+def test_auto_is_triangle_where_it_is_installed() -> None:
+    assert triangulator_used() == triangulator_used("triangle") == "triangle"
+    points, segments = grains(1)
+    one, two = triangulate(points, segments, 5.0), triangulate(points, segments, 5.0, "triangle")
+    assert all(a.tobytes() == b.tobytes() for a, b in zip(one, two, strict=True))
+
+
+def test_auto_is_cdt_elsewhere(forgotten: Callable[[str], None]) -> None:
+    forgotten("triangle")
+    assert triangulator_used() == triangulator_used("cdt") == "cdt"
+    with pytest.raises(InputError, match="'triangle', but its Python package is missing: pip install triangle"):
+        triangulator_used("triangle")
+    assert len(triangulate(SQUARE, AROUND).triangles) == 2
+
+
+def test_without_either_the_error_names_both(forgotten: Callable[[str], None]) -> None:
+    forgotten("triangle")
+    forgotten("pythoncdt")
+    with pytest.raises(InputError, match=r"'auto', but its .* is missing: pip install pythoncdt or triangle"):
+        triangulate(SQUARE, AROUND)
+
+
+def test_other_names_are_refused() -> None:
+    with pytest.raises(InputError, match="triangulator is 'netgen'; give one of auto, triangle, cdt"):
+        triangulator_used("netgen")
+
+
+@both
+def test_only_the_library_that_is_used_is_imported(by: str) -> None:
+    code = (
+        "import sys, numpy as np\n"
+        "from imgquad_core.mesher.triangulation import triangulate\n"
+        f"triangulate(np.array({SQUARE.tolist()}), np.array({AROUND.tolist()}), None, {by!r})\n"
+        "print('triangle' in sys.modules, 'pythoncdt' in sys.modules)"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert told.stdout.split() == [str(by == "triangle"), str(by == "cdt")]
 
 
 def test_constraint_table_tells_the_region_on_the_left_of_each_directed_edge() -> None:
