@@ -15,7 +15,7 @@ from figure_tables import FIGURES, Limit, limit_table, ours, row, table, theirs
 from gmsh_routes import ROUTES
 from imgquad_core.mesher.efforts import EFFORTS
 from processes import FailedError, answer, mesh_picture
-from rocks import HAS_GENERATOR, SOURCE, draw_rock
+from rocks import SOURCE, draw_rock
 
 SIDE, SIZE = 1024, 2.0
 OTHER_SEEDS = (12, 13, 14, 15, 16)
@@ -45,16 +45,13 @@ class Rock(NamedTuple):
 B1 = Rock("B1", efforts=tuple(EFFORTS), routes=tuple(ROUTES))
 B2 = B1._replace(name="B2", drawing={"veins": 4})
 OTHERS = [Rock(f"seed {seed}", drawing={"seed": seed}) for seed in OTHER_SEEDS]
-ROCKS = [B1, B2, *OTHERS] if HAS_GENERATOR else [B1._replace(name="demo rock")]
+ROCKS = [B1, B2, *OTHERS]
 
 
 def section(folder: Path) -> str:
     """Mesh all rocks; return the tables."""
     found = all_measured(ROCKS, folder)
-    parts = [SOURCE, figures_table(found)]
-    if HAS_GENERATOR:
-        parts += [limits(found), spread(found)]
-    return "\n\n".join(parts)
+    return "\n\n".join([SOURCE, figures_table(found), limits(found), spread(found)])
 
 
 def all_measured(rocks: Iterable[Rock], folder: Path) -> dict[str, Figures]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from gmsh_routes import ROUTES, coarse_curves, gmsh_mesh
 from growth import exponent
 from imgquad_core import MeshOptions, QuadMesh, mesh_image
 from imgquad_core.measures.quality import quad_areas
+from rocks import MINERALS, rock, uniform
 from run import PARTS, replaced
 from support import ROOT
 from support.labels import voronoi
@@ -68,3 +70,18 @@ def test_the_page_has_a_place_for_each_part() -> None:
         assert before.replace("\none\n", "\nother\n") == after
     with pytest.raises(SystemExit, match="begin: speed"):
         replaced("nothing", "speed", "text")
+
+
+def test_the_rocks_are_those_that_were_measured() -> None:
+    assert zlib.crc32(rock(1024, 48, 0, 0.0, 11).tobytes()) == 1056158398  # B1
+    assert zlib.crc32(rock(256, 48, 4, 0.05, 11).tobytes()) == 747899585
+
+
+def test_rocks_have_veins_and_noise_as_asked() -> None:
+    plain, veined, noisy = rock(300, 30, 0, 0.0, 5), rock(300, 30, 3, 0.0, 5), rock(300, 30, 3, 0.1, 5)
+    assert set(np.unique(plain)) == set(range(MINERALS))
+    changed = plain != veined
+    assert (veined[changed] == MINERALS).all()
+    assert 2 * 300 < changed.sum() < 8 * 300
+    assert (noisy != veined).mean() == pytest.approx(0.1, abs=0.01)
+    assert uniform(1, 10_000).mean() == pytest.approx(0.5, abs=0.02)
