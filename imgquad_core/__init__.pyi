@@ -1,3 +1,4 @@
+from . import boundary, cleanup, fe, geometry, measures, mesher, picture, pipeline, tracing, writers
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .options import MeshOptions
 from .pipeline import Run, mesh_image, run
@@ -9,6 +10,16 @@ __all__ = [
     "MeshOptions",
     "QuadMesh",
     "Run",
+    "boundary",
+    "cleanup",
+    "fe",
+    "geometry",
+    "measures",
     "mesh_image",
+    "mesher",
+    "picture",
+    "pipeline",
     "run",
+    "tracing",
+    "writers",
 ]

@@ -69,7 +69,11 @@ class RegionErrors:
 
 
 def material_ledger(
-    picture: LabelImage, clean: LabelImage, boundary: BoundaryGraph, mesh: QuadMesh, pixel_size: float = 1.0
+    picture: LabelImage,
+    clean: LabelImage,
+    boundary: BoundaryGraph,
+    mesh: QuadMesh,
+    pixel_sides: tuple[float, float] = (1.0, 1.0),
 ) -> tuple[MaterialAccount, ...]:
     """Account for every material of `picture`, in the order of its numbers.
 
@@ -81,11 +85,12 @@ def material_ledger(
         The smoothed boundaries.
     mesh : QuadMesh
         The mesh.
-    pixel_size : float
-        Length of a pixel in the mesh's unit.
+    pixel_sides : tuple of float
+        Width and height of a pixel in the mesh's unit.
     """
-    enclosed = enclosed_areas(boundary)
-    meshed = region_areas(mesh) / pixel_size**2
+    pixels_in_square = clean.labels.size / (boundary.shape[0] * boundary.shape[1])
+    enclosed = enclosed_areas(boundary) * pixels_in_square
+    meshed = region_areas(mesh) / (pixel_sides[0] * pixel_sides[1])
     rows = []
     for label in np.unique(picture.labels[picture.labels != VOID]):
         pixels = int(np.count_nonzero(clean.labels == label))

@@ -224,8 +224,8 @@ class QuadMesh:
         """Number of quads at each point."""
         return np.bincount(self.quads.ravel(), minlength=self.n_points)
 
-    def scaled(self, factor: float) -> QuadMesh:
-        """Return the same mesh with all coordinates times `factor`."""
+    def scaled(self, factor: float | tuple[float, float]) -> QuadMesh:
+        """Return the same mesh with all coordinates times `factor`, or x and y each times its own."""
         return replace(self, points=self.points * factor)
 
 

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import isfinite
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from numbers import Integral
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from .boundary import DIRECTIONS, ExtractionOptions, SmoothingOptions
+from . import picture
+from .boundary import ExtractionOptions, SmoothingOptions
+from .declared import Declaration, check, option, same_as
 from .errors import InputError
 from .mesher import EFFORTS, MeshingOptions
-from .model import Materials
-from .picture import Box, DenoiseOptions, ReadOptions, SegmentationOptions, automatic_limits, material_number
+from .picture import DenoiseOptions, ReadOptions, SegmentationOptions
+
+if TYPE_CHECKING:
+    from .model import Materials
+    from .picture import Box
+
+_SIDE = Declaration(1.0, "", float, above=0.0)
 
 
 @dataclass(frozen=True)
@@ -41,8 +48,9 @@ class MeshOptions:
         Largest ratio of the lengths of neighbouring edges on a boundary.
     max_shift : float
         How far smoothing moves a boundary at most.
-    pixel_size : float
-        Length of a pixel in the unit of the mesh.
+    pixel_size : float or (float, float)
+        Length of a pixel in the unit of the mesh; width and height where they differ. Lengths in pixels then mean the
+        shorter side.
     drop : sequence of str or int
         Materials that are left out: their boundary becomes a free border.
     drop_transparent : bool
@@ -63,39 +71,80 @@ class MeshOptions:
         Who makes the Delaunay triangles that quads come from; `auto` is Triangle where it is installed, else CDT.
     """
 
-    size: float = 4.0
-    boundary_size: float | None = None
-    material_sizes: Mapping[str | int, float] = field(default_factory=lambda: MappingProxyType({}))
-    growth: float = 1.3
-    colors: Any = "auto"
-    min_pixels: int | Literal["auto"] = "auto"
-    min_length: float | Literal["auto"] = "auto"
-    policy: str = "minority"
-    edge_ratio: float = 1.2
-    max_shift: float = 1.0
-    pixel_size: float = 1.0
-    drop: tuple[str | int, ...] = ()
-    drop_transparent: bool = False
-    crop: Box | None = None
-    periodic: str = "none"
-    frame: int | None = None
-    max_pixels: int = ReadOptions.max_pixels
-    effort: str = "normal"
-    threads: int = 1
-    triangulator: str = "auto"
+    size: float = same_as(SmoothingOptions, "size")
+    boundary_size: float | None = same_as(SmoothingOptions, "boundary_size")
+    material_sizes: Mapping[str | int, float] = same_as(
+        SmoothingOptions, "material_sizes", default=MappingProxyType({})
+    )
+    growth: float = same_as(SmoothingOptions, "growth")
+    colors: Any = same_as(SegmentationOptions, "colors")
+    min_pixels: int | Literal["auto"] = same_as(
+        DenoiseOptions,
+        "min_pixels",
+        default="auto",
+        word="auto",
+        help="clusters of fewer pixels are noise if they are also too short; auto: none in label pictures, else the "
+        "square of the least length; 0: none",
+    )
+    min_length: float | Literal["auto"] = same_as(
+        DenoiseOptions,
+        "min_length",
+        default="auto",
+        word="auto",
+        help="least length (the longest way inside, also of bent ones) of clusters that stay, in pixels; auto: a "
+        "hundredth of the picture's shorter side, from 4 to 16, in label pictures 0",
+    )
+    policy: str = same_as(ExtractionOptions, "policy")
+    edge_ratio: float = same_as(SmoothingOptions, "edge_ratio")
+    max_shift: float = same_as(SmoothingOptions, "max_shift")
+    pixel_size: float | tuple[float, float] = option(
+        1.0,
+        "length of a pixel in the unit of the mesh; width and height where they differ (sizes in pixels then mean the "
+        "shorter side)",
+        kind=object,
+        told="1",
+    )
+    drop: tuple[str | int, ...] = option(
+        (), "materials that are left out, by name or number: their boundary becomes a free border", topic="picture"
+    )
+    drop_transparent: bool = same_as(SegmentationOptions, "drop_transparent")
+    crop: Box | None = option(
+        None,
+        "mesh this part only: left, upper, right and lower bound in whole pixels from the picture's upper left corner",
+        topic="picture",
+    )
+    periodic: str = option(
+        "none",
+        "directions in which opposite sides get nodes at the same places, for a periodic cell",
+        choices=("none", "x", "y", "xy"),
+    )
+    frame: int | None = same_as(ReadOptions, "frame")
+    max_pixels: int = same_as(ReadOptions, "max_pixels")
+    effort: str = same_as(MeshingOptions, "effort")
+    threads: int = same_as(MeshingOptions, "threads")
+    triangulator: str = same_as(MeshingOptions, "triangulator")
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.pixel_size) and self.pixel_size > 0):
-            raise InputError(f"pixel_size is {self.pixel_size}: give a length above 0")
-        if self.periodic not in ("none", *DIRECTIONS):
-            raise InputError(f"periodic is '{self.periodic}': give none, x, y or xy")
+        check(self)
+        if not all(_SIDE.allows(side) for side in self.pixel_sides):
+            raise InputError(f"pixel_size is {self.pixel_size!r}; give a length above 0, or a width and a height")
+        if self.crop is not None and not _is_box(self.crop):
+            raise InputError(f"crop is {self.crop!r}; give left, upper, right and lower bound in whole pixels")
+        dropped: object = self.drop
+        if isinstance(dropped, str) or not isinstance(dropped, Iterable):
+            raise InputError(f"drop is {self.drop!r}; give a tuple of names or numbers of materials")
         # each stage checks its own options: now, not after minutes of work
         self.meshing(None)
         self.smoothing(None)
         self.segmentation()
-        self.noise(True, (1, 1))
         ReadOptions(self.max_pixels, self.frame)
         ExtractionOptions(self.policy)
+
+    @property
+    def pixel_sides(self) -> tuple[float, float]:
+        """Width and height of a pixel, in the unit of the mesh."""
+        sides = self.pixel_size
+        return (sides[0], sides[1]) if isinstance(sides, (tuple, list)) and len(sides) == 2 else (sides, sides)
 
     def segmentation(self) -> SegmentationOptions:
         """Return the options of segmentation."""
@@ -103,10 +152,10 @@ class MeshOptions:
 
     def noise(self, quantised: bool, shape: tuple[int, int]) -> DenoiseOptions:
         """Return the limits of noise in a picture of `shape`."""
-        auto = automatic_limits(quantised, shape)
+        auto = picture.automatic_limits(quantised, shape)
         asked = (self.min_pixels, self.min_length)
         if asked != ("auto", "auto") and "auto" in asked and not auto.removes:
-            auto = automatic_limits(True, shape)  # one limit asked for switches noise removal on
+            auto = picture.automatic_limits(True, shape)  # one limit asked for switches noise removal on
         return DenoiseOptions(
             min_pixels=auto.min_pixels if self.min_pixels == "auto" else self.min_pixels,
             min_length=auto.min_length if self.min_length == "auto" else self.min_length,
@@ -122,7 +171,7 @@ class MeshOptions:
             edge_ratio=self.edge_ratio,
             max_shift=self.max_shift,
             material_sizes=self._sizes(materials),
-            in_twelves=EFFORTS[self.effort].in_nine,
+            edge_multiple=EFFORTS[self.effort].edge_multiple,
         )
 
     def meshing(self, materials: Materials | None) -> MeshingOptions:
@@ -139,4 +188,8 @@ class MeshOptions:
     def _sizes(self, materials: Materials | None) -> dict[int, float]:
         if materials is None:  # only the values are checked
             return dict(enumerate(self.material_sizes.values()))
-        return {material_number(materials, name): size for name, size in self.material_sizes.items()}
+        return picture.sizes_by_number(materials, self.material_sizes)
+
+
+def _is_box(box: Any) -> bool:
+    return isinstance(box, (tuple, list)) and len(box) == 4 and all(isinstance(bound, Integral) for bound in box)

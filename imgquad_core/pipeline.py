@@ -2,31 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from types import MappingProxyType
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import ahead
-from .boundary.extraction import ExtractionOptions, extract_boundaries
-from .boundary.periodic import match_opposite_sides, rematch
-from .boundary.smoothing import SmoothingOptions, smooth_boundaries
+from .boundary import (
+    ExtractionOptions,
+    SmoothingOptions,
+    TrueShape,
+    extract_boundaries,
+    match_opposite_sides,
+    rematch,
+    smooth_boundaries,
+    true_shape,
+)
 from .errors import InputError
-from .mesher.efforts import MeshingOptions
-from .mesher.meshing import mesh_boundaries
+from .mesher import MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .options import MeshOptions
-from .picture.noise import DenoiseOptions, Removal, list_removed, remove_noise
-from .picture.reading import Picture, ReadOptions, read_picture
-from .picture.segmentation import Segmentation, segment_picture
-from .picture.selection import assert_solid, crop_image, drop_materials, material_number
+from .picture import (
+    DenoiseOptions,
+    Picture,
+    ReadOptions,
+    Removal,
+    Segmentation,
+    assert_solid,
+    crop_image,
+    drop_materials,
+    list_removed,
+    read_picture,
+    remove_noise,
+    segment_picture,
+    sizes_by_number,
+)
 
-T = TypeVar("T")
 Source: TypeAlias = "str | Path | NDArray[Any] | LabelImage"
 #: called with the name of the stage that starts, its number from 0, and the number of stages
 Progress: TypeAlias = Callable[[str, int, int], None]
@@ -55,10 +72,15 @@ class Run:
         The materials as meshed.
     pixel_boundary, boundary : BoundaryGraph
         Before and after smoothing.
+    square : tuple of float
+        Width and height, in the unit of the mesh, of what `boundary` and `pixel_mesh` have as unit of length: a pixel,
+        or a square of its shorter side.
+    pixel_mesh : QuadMesh
+        The mesh on `boundary`.
     mesh : QuadMesh
-        In the unit of `options.pixel_size`.
+        The same in the unit of `options.pixel_size`.
     seconds : mapping of str to float
-        Time of each of `STAGES`.
+        Time of each of `STAGES` that was needed.
     """
 
     options: MeshOptions
@@ -69,6 +91,8 @@ class Run:
     labels: LabelImage
     pixel_boundary: BoundaryGraph
     boundary: BoundaryGraph
+    square: tuple[float, float]
+    pixel_mesh: QuadMesh
     mesh: QuadMesh
     seconds: Mapping[str, float]
 
@@ -107,12 +131,14 @@ def mesh_image(image: Source, options: MeshOptions | None = None) -> QuadMesh:
     return run(image, options).mesh
 
 
-def run(source: Source, options: MeshOptions | None = None, progress: Progress | None = None) -> Run:
+def run(source: Source | Segmentation, options: MeshOptions | None = None, progress: Progress | None = None) -> Run:
     """Do what `mesh_image` does, and keep what the stages gave.
 
     Parameters
     ----------
-    source, options
+    source : array_like, LabelImage, path or Segmentation
+        As for `mesh_image`; a picture that is segmented already is taken as it is.
+    options : MeshOptions, optional
         As for `mesh_image`.
     progress : callable, optional
         Called as each stage starts.
@@ -120,19 +146,21 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
     ahead.start()
     options = options or MeshOptions()
     timed = _Stopwatch(progress)
-    raw = timed("read", read_source, source, ReadOptions(options.max_pixels, options.frame))
-    found = timed("segment", segment_picture, raw, options.segmentation())
+    found = source if isinstance(source, Segmentation) else _segmented(source, options, timed)
     picture = crop_image(found.image, options.crop) if options.crop else found.image
     noise = options.noise(found.quantised, found.image.shape)
-    clean = timed("denoise", remove_noise, picture, noise)
+    with timed("denoise"):
+        clean = remove_noise(picture, noise)
     labels = drop_materials(clean, options.drop)
     smoothing, meshing = options.smoothing(picture.materials), options.meshing(picture.materials)
-    _assert_feasible(labels, smoothing)
-    staircase = timed("boundary", extract_boundaries, labels, ExtractionOptions(options.policy))
-    boundary = timed("smooth", smooth_boundaries, staircase, smoothing)
-    if options.periodic != "none":
-        boundary = match_opposite_sides(boundary, options.periodic)
-    boundary, mesh = timed("mesh", fill_boundaries, boundary, meshing, labels.materials, options.periodic)
+    true = true_shape(labels.shape, options.pixel_sides)
+    _assert_feasible(true.shape, smoothing.size)
+    with timed("boundary"):
+        staircase = extract(labels, ExtractionOptions(options.policy))
+    with timed("smooth"):
+        boundary = smooth(staircase, smoothing, true, options.periodic)
+    with timed("mesh"):
+        boundary, mesh = fill_boundaries(boundary, meshing, labels.materials, options.periodic)
     return Run(
         options=options,
         segmentation=found,
@@ -142,7 +170,9 @@ def run(source: Source, options: MeshOptions | None = None, progress: Progress |
         labels=labels,
         pixel_boundary=staircase,
         boundary=boundary,
-        mesh=mesh.scaled(options.pixel_size) if options.pixel_size != 1.0 else mesh,
+        square=true.square,
+        pixel_mesh=mesh,
+        mesh=mesh.scaled(true.square) if true.square != (1.0, 1.0) else mesh,
         seconds=MappingProxyType(timed.seconds),
     )
 
@@ -154,8 +184,24 @@ def read_source(source: Source, options: ReadOptions | None = None) -> Picture |
     return source if isinstance(source, LabelImage) else np.asarray(source)
 
 
+def extract(labels: LabelImage, options: ExtractionOptions | None = None) -> BoundaryGraph:
+    """Return the pixel boundary of a picture that has pixels to mesh."""
+    assert_solid(labels)
+    return extract_boundaries(labels, options)
+
+
+def smooth(
+    graph: BoundaryGraph, options: SmoothingOptions, true: TrueShape | None = None, periodic: str = "none"
+) -> BoundaryGraph:
+    """Return smooth boundaries cut into edges, in true shape, with opposite sides alike where they are periodic."""
+    shape = graph.shape if true is None else true.shape
+    _assert_feasible(shape, options.size)
+    graph = smooth_boundaries(graph, options, None if shape == graph.shape else shape)
+    return match_opposite_sides(graph, periodic) if periodic != "none" else graph
+
+
 def fill_boundaries(
-    boundary: BoundaryGraph, options: MeshingOptions, materials: Materials, periodic: str
+    boundary: BoundaryGraph, options: MeshingOptions, materials: Materials, periodic: str = "none"
 ) -> tuple[BoundaryGraph, QuadMesh]:
     """Mesh; where the mesher has cut edges of one side of a periodic cell only, cut the other, too, and mesh anew."""
     mesh = mesh_boundaries(boundary, options, materials)
@@ -180,10 +226,16 @@ def thin_features(labels: LabelImage, mesh: QuadMesh, options: MeshOptions) -> s
         Sizes in pixels.
     """
     sizes = dict.fromkeys(labels.materials.labels.tolist(), options.size)
-    sizes |= {material_number(labels.materials, name): size for name, size in options.material_sizes.items()}
-    expected = sum(
-        np.count_nonzero(labels.labels == number) / min(size, options.boundary_size or size) ** 2
-        for number, size in sizes.items()
+    sizes |= sizes_by_number(labels.materials, options.material_sizes)
+    true = true_shape(labels.shape, options.pixel_sides).shape
+    expected = (
+        true[0]
+        * true[1]
+        / labels.labels.size
+        * sum(
+            np.count_nonzero(labels.labels == number) / min(size, options.boundary_size or size) ** 2
+            for number, size in sizes.items()
+        )
     )
     if mesh.n_quads <= max(MANY_TIMES * expected, MANY_QUADS):
         return None
@@ -194,26 +246,33 @@ def thin_features(labels: LabelImage, mesh: QuadMesh, options: MeshOptions) -> s
 
 
 class _Stopwatch:
-    """Runs one stage after the other and keeps their times."""
+    """Tells which stage starts, and keeps their times."""
 
     def __init__(self, progress: Progress | None) -> None:
         self.seconds: dict[str, float] = {}
         self._progress = progress
 
-    def __call__(self, stage: str, work: Callable[..., T], *values: Any) -> T:
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
         if self._progress:
             self._progress(stage, STAGES.index(stage), len(STAGES))
         start = perf_counter()
-        result = work(*values)
+        yield
         self.seconds[stage] = perf_counter() - start
-        return result
 
 
-def _assert_feasible(image: LabelImage, options: SmoothingOptions) -> None:
-    assert_solid(image)
-    quads = image.labels.size / options.size**2
+def _segmented(source: Source, options: MeshOptions, timed: _Stopwatch) -> Segmentation:
+    with timed("read"):
+        raw = read_source(source, ReadOptions(options.max_pixels, options.frame))
+    with timed("segment"):
+        return segment_picture(raw, options.segmentation())
+
+
+def _assert_feasible(shape: tuple[int, int], size: float) -> None:
+    rows, cols = shape
+    quads = rows * cols / size**2
     if quads > MOST_QUADS:
         raise InputError(
-            f"size {options.size:g} would need about {quads:.2g} quads for {image.labels.size} pixels: "
-            f"at most {MOST_QUADS:.0e} are made; ask for a larger size or crop the picture"
+            f"size {size:g} would need about {quads:.2g} quads for {cols} x {rows} pixels: at most {MOST_QUADS:.0e} "
+            "are made; ask for a larger size, crop the picture, or mend its spacing"
         )

@@ -17,7 +17,6 @@ Regions are labelled from the same table, so the faces between the chains are th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +27,8 @@ from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, joined_pair, pol
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind
 
+from .options import ExtractionOptions
+
 OUTSIDE = -2  #: colour of what lies around the picture
 # One byte for each pixel corner: bits 0-3 the sides with two colours, bits 4-5 what the chains do there,
 # bits 6-7 whether the side to the right and the side below have been traced.
@@ -35,26 +36,6 @@ _UP, _RIGHT, _DOWN, _LEFT = 1, 2, 4, 8
 _MEETS, _JOINS_AD, _JOINS_BC = 16, 32, 48
 _WHAT = 48
 _SEEN_RIGHT, _SEEN_DOWN = 64, 128
-
-
-@dataclass(frozen=True)
-class ExtractionOptions:
-    """How boundaries are extracted.
-
-    Parameters
-    ----------
-    policy : {"minority", "majority", "lower", "diagonal", "junction"}
-        What happens where two colours form a checkerboard block of 2 x 2 pixels. "minority": the colour with fewer
-        pixels within 3 px is joined, the lower label on a tie (keeps thin lines whole and gives the fewest regions);
-        "majority": the other one; "lower": the lower label; "diagonal": the pixels upper left and lower right;
-        "junction": none, four chains meet. Where one diagonal only has one colour it is joined, except by
-        "junction".
-    """
-
-    policy: str = "minority"
-
-    def __post_init__(self) -> None:
-        policy_code(self.policy)
 
 
 class _Chains(NamedTuple):

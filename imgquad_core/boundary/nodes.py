@@ -82,7 +82,7 @@ def place_nodes(
     is_corner: Flags,
     at_least: Ints,
     exact: Flags,
-    in_twelves: bool,
+    edge_multiple: int,
 ) -> Placement:
     """Place the final nodes on every chain.
 
@@ -98,8 +98,8 @@ def place_nodes(
         Least number of coarse segments of each chain.
     exact : bool, shape (n_chains,)
         Chains that get a coarse node at every dense point.
-    in_twelves : bool
-        Whether very long pieces get a multiple of twelve final edges.
+    edge_multiple : int
+        Very long pieces get a multiple of this many final edges; even.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def place_nodes(
             if i < last and not is_corner[i] and not exact[c]:
                 continue
             least = -(-at_least[c] // pieces)
-            number = 1 if exact[c] else _count(curves, cost, limit, is_corner, begin, i, least, in_twelves)
+            number = 1 if exact[c] else _count(curves, cost, limit, is_corner, begin, i, least, edge_multiple)
             _divide(cost, begin, i, 2 * number, at, n)
             n += 2 * number
             corner[n] = is_corner[i]
@@ -143,14 +143,14 @@ def place_nodes(
 
 @verb
 def _count(
-    curves: Curves, cost: Floats, limit: Floats, is_corner: Flags, begin: int, end: int, least: int, in_twelves: bool
+    curves: Curves, cost: Floats, limit: Floats, is_corner: Flags, begin: int, end: int, least: int, edge_multiple: int
 ) -> int:
     """Choose the number of coarse segments of a piece."""
     total = 0.5 * (cost[end] - cost[begin])
     length = curves.arc[end] - curves.arc[begin]
     enough = _SHORT if is_corner[begin] or is_corner[end] else _LONG
     if total > enough and length > 2 * _COARSE * total * limit[begin]:
-        step = 6 if in_twelves and total > _VERY_LONG else 2
+        step = edge_multiple // 2 if total > _VERY_LONG else 2
         return step * max(int(total / step + 0.5), max((least + step - 1) // step, 1))
     return max(int(np.ceil(total - 0.3)), least)
 

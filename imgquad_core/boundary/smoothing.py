@@ -8,13 +8,11 @@ their areas (`areas`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
-from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
 
 from .curves import Curves, curves_of, per_point, pin_ends
@@ -23,6 +21,7 @@ from .feature_size import local_feature_size
 from .fitting import WINDOWS, fit_pieces
 from .junctions import place_junctions
 from .nodes import Nodes
+from .options import SmoothingOptions
 from .sharp_corners import beside_corners, find_corners, place_corners
 from .true_shape import stretch
 from .withdrawal import Draft, place_freely, restore_areas_freely
@@ -31,50 +30,6 @@ _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign poi
 _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for areas
 _NARROW = 2.0  # px; least reach of the local feature size that bounds shifts
 _ARC_RATIO = 2.0  # arc over distance of a foreign point of the pixel boundary
-
-
-@dataclass(frozen=True)
-class SmoothingOptions:
-    """How boundaries are smoothed and cut into edges.
-
-    Parameters
-    ----------
-    size : float
-        Length of final edges, in pixels.
-    boundary_size : float, optional
-        The same on boundaries, `size` where not given.
-    growth : float
-        Largest ratio of the sizes of neighbouring elements.
-    edge_ratio : float
-        Largest ratio of the lengths of neighbouring edges of a chain.
-    max_shift : float
-        How far a point of the boundary moves at most, in pixels.
-    material_sizes : mapping of int to float
-        Length of final edges per material label; a boundary takes the least of its two sides'.
-    in_twelves : bool
-        Whether very long pieces between corners get a multiple of twelve edges, up to 10 % longer or shorter than
-        asked: the quads of very wide faces can then be split in nine.
-    """
-
-    size: float = 4.0
-    boundary_size: float | None = None
-    growth: float = 1.3
-    edge_ratio: float = 1.2
-    max_shift: float = 1.0
-    material_sizes: Mapping[int, float] | None = None
-    in_twelves: bool = False
-
-    def __post_init__(self) -> None:
-        sizes = {"size": self.size, "boundary_size": self.boundary_size or self.size}
-        sizes |= {f"size of material {label}": value for label, value in (self.material_sizes or {}).items()}
-        for name, value in sizes.items():
-            if not 0.05 <= value < float("inf"):
-                raise InputError(f"{name} is {value}; give a length of at least 0.05 px")
-        for name, ratio in (("growth", self.growth), ("edge_ratio", self.edge_ratio)):
-            if not 1.01 <= ratio <= 10.0:
-                raise InputError(f"{name} is {ratio}; give a ratio from 1.01 to 10")
-        if not 0.0 <= self.max_shift <= 10.0:
-            raise InputError(f"max_shift is {self.max_shift}; give a length from 0 to 10 px")
 
 
 def smooth_boundaries(
@@ -108,7 +63,7 @@ def smooth_boundaries(
     smooth = _smooth(curves, node, is_corner, room)
     if shape is not None:
         graph, curves, ends, node, smooth = stretch(graph, curves, ends, node, smooth, shape)
-    draft = Draft(curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.in_twelves, graph.shape)
+    draft = Draft(curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.edge_multiple, graph.shape)
     size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, graph.shape)
     nodes, gently = place_freely(draft, size)
     nodes = restore_areas_freely(graph, draft, nodes, room, options.max_shift, gently)

@@ -51,7 +51,7 @@ class Draft(NamedTuple):
     is_corner: Flags  #: (n,) dense points that become nodes
     limit: Floats  #: (n,) asked length of final edges
     edge_ratio: float
-    in_twelves: bool  #: whether long pieces get a multiple of twelve final edges
+    edge_multiple: int  #: very long pieces get a multiple of this many final edges
     shape: tuple[int, int]
 
 
@@ -112,7 +112,7 @@ def _place(draft: Draft, size: Floats, at_least: Ints, exact: Flags, withdrawn: 
     curves = draft.curves
     points = draft.smooth + withdrawn[:, None] * (curves.raw - draft.smooth)
     pin_ends(points, curves, _withdraw_ends(draft, withdrawn))
-    placed = place_nodes(curves, size, draft.limit, draft.is_corner, at_least, exact, draft.in_twelves)
+    placed = place_nodes(curves, size, draft.limit, draft.is_corner, at_least, exact, draft.edge_multiple)
     even_out(points, placed, exact, draft.edge_ratio)
     return number_nodes(curves, len(draft.node), snapped(points_at(points, placed.at)), placed)
 

@@ -1,5 +1,6 @@
 from .faces import FaceQuads
-from .optimization import OptimizationOptions, optimize
+from .optimization import optimize
+from .options import OptimizationOptions
 
 __all__ = [
     "FaceQuads",

@@ -4,28 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from imgquad_core.arrays import Ints
 
 from .faces import FaceQuads, taken_out
+from .options import PORTIONS, Portions
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 TILE = 8  # edge lengths; quads of a batch are numbered tile by tile
-
-
-class Portions(NamedTuple):
-    """How large the parts of a mesh are that threads share: handed down, so that a test can ask for small ones."""
-
-    batch: int = 3000  #: quads of a batch, so that it stays in the cache
-    largest: int = 9000  #: quads of a face that shares its batch with others
-    strip: int = 64  #: quads across a strip of a larger face, about: many times a cavity
-
-
-PORTIONS = Portions()
 
 
 def in_batches(

@@ -10,8 +10,6 @@ Rim nodes (on constraints) never move and never vanish; `wanted` tells how many 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
@@ -39,6 +37,7 @@ from .cavity import (
     settle,
 )
 from .faces import FaceQuads
+from .options import CleanUp
 from .patterns import MAX_CORNERS, POINTS, QUADS, Canvas, choose_cut, cut_quads, draw_cut, piece_fits, smooth_drawn
 
 TRIAL_SWEEPS = 5
@@ -46,15 +45,6 @@ SMALLEST_SHARE, LARGEST_SHARE = 0.15, 4.0  # of a new quad's area in the mean of
 FEWEST, MOST = 0.7, 1.4  # new quads per old quad
 FLAT = 2  # quads beside a side of a pattern
 RETRY = 1.3  # a cavity this much larger than the last failed one is tried again at the same gain
-
-
-class CleanUp(NamedTuple):
-    """How far the clean-up goes."""
-
-    sizes: tuple[int, ...]  #: largest cavity (quads) of each pass
-    tolerance: float  #: quality that may be paid for one irregular node
-    worst: float  #: scaled Jacobian that every new quad must have, unless the old ones were worse
-    thorough: int = 40  #: larger cavities begin at nodes with too many quads only: half the time, .05 % more irregular
 
 
 def clean_up(mesh: FaceQuads, how: CleanUp, seeds: Flags | None = None) -> FaceQuads:

@@ -6,12 +6,9 @@ face keeps its old quads unless the new ones are better.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
-from imgquad_core.errors import InputError
 from imgquad_core.geometry.quad_shape import lower_to_worst, nodes_of_poor
 from imgquad_core.grouping import grouped
 from imgquad_core.measures.quality import corner_angles, scaled_jacobian, sectors_of
@@ -19,7 +16,8 @@ from imgquad_core.model import PointKind, QuadMesh
 
 from .batches import in_batches
 from .faces import INNER_VALENCE, FaceQuads, faces_only, joined, wanted_quads
-from .irregular_nodes import CleanUp, clean_up
+from .irregular_nodes import clean_up
+from .options import CleanUp, OptimizationOptions
 from .relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
 from .strips import nodes_around
 
@@ -31,28 +29,6 @@ EFFORTS = {
 GOOD_ENOUGH = 0.5  # scaled Jacobian down to which a face may get worse where that saves irregular nodes
 LAPLACE_SWEEPS, NEWTON_SWEEPS = 8, 6
 UNTANGLE_ROUNDS = 12  # while rings are bad
-
-
-@dataclass(frozen=True)
-class OptimizationOptions:
-    """How far a mesh is optimised.
-
-    Parameters
-    ----------
-    effort : {"fast", "normal", "best"}
-        How far irregular nodes are hunted.
-    threads : int
-        Number of threads; the mesh does not depend on it.
-    """
-
-    effort: str = "normal"
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        if self.effort not in EFFORTS:
-            raise InputError(f"effort is {self.effort!r}; give one of {', '.join(EFFORTS)}")
-        if self.threads < 1:
-            raise InputError(f"threads is {self.threads}; give at least 1")
 
 
 def optimize(mesh: QuadMesh, options: OptimizationOptions | None = None) -> QuadMesh:

@@ -19,8 +19,9 @@ import numpy as np
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.jit import kernel
 
-from .batches import PORTIONS, Portions, in_threads
+from .batches import in_threads
 from .faces import FaceQuads, taken_out
+from .options import PORTIONS, Portions
 
 LEFT_ALONE = -1  # number of the piece that is not worked on
 

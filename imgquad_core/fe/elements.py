@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from imgquad_core.declared import check, option
 from imgquad_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,17 +37,27 @@ class ElementOptions:
         Leave the split interfaces open: no cohesive elements between their two sides.
     """
 
-    order: int = 1
-    nodes: int = 8
-    cohesive: str | Iterable[tuple[str, str]] | None = None
-    extrude: float | None = None
-    layers: int = 1
+    order: int = option(
+        1,
+        "1: quads of four nodes; 2: nodes in the middles of sides, on the curves of the boundaries",
+        choices=(1, 2),
+        topic="elements",
+    )
+    nodes: int = option(8, "nodes of a quad of order 2", choices=(8, 9), topic="elements")
+    cohesive: str | Iterable[tuple[str, str]] | None = option(
+        None,
+        "pairs of materials between which interfaces are split for cohesive elements; all: between all materials",
+        topic="elements",
+    )
+    extrude: float | None = option(
+        None, "thickness of hexes, in the unit of the mesh", kind=float, what="a length", above=0.0, topic="elements"
+    )
+    layers: int = option(1, "number of hexes over the thickness", least=1, topic="elements")
     periodic: str | None = None
     open_interfaces: bool = False
 
     def __post_init__(self) -> None:
-        if self.order not in (1, 2):
-            raise InputError(f"order is {self.order!r}: elements of order 1 and 2 are made")
+        check(self)
         if self.order == 2 and self.extrude is not None:
             raise InputError("order 2 and extrusion exclude each other: hexes have 8 nodes")
         if self.open_interfaces and self.cohesive is None:

@@ -14,10 +14,9 @@ Regions, the clusters of noise removal and the boundary between them all ask her
 from __future__ import annotations
 
 from imgquad_core.arrays import Labels
-from imgquad_core.errors import InputError
+from imgquad_core.declared import POLICIES, POLICY
 from imgquad_core.jit import verb
 
-POLICIES = ("minority", "majority", "lower", "diagonal", "junction")
 MINORITY, MAJORITY, LOWER, DIAGONAL, JUNCTION = range(5)  #: places in `POLICIES`
 NOTHING, PAIR_AD, PAIR_BC = range(3)  #: what is joined
 REACH = 3  # pixels each way from the corner in which the colours are counted
@@ -25,8 +24,7 @@ REACH = 3  # pixels each way from the corner in which the colours are counted
 
 def policy_code(policy: str) -> int:
     """Return the place of `policy` in `POLICIES`, or raise `InputError`."""
-    if policy not in POLICIES:
-        raise InputError(f"policy is {policy!r}; use one of {', '.join(POLICIES)}")
+    POLICY.check("policy", policy)
     return POLICIES.index(policy)
 
 

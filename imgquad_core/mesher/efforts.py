@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-import numpy as np
+from imgquad_core.cleanup.options import PORTIONS, CleanUp, Portions
+from imgquad_core.declared import EFFORT, GROWTH, MATERIAL_SIZES, SIZE, THREADS, check, option
 
-from imgquad_core.arrays import Floats, Labels
-from imgquad_core.cleanup.batches import PORTIONS, Portions
-from imgquad_core.cleanup.irregular_nodes import CleanUp
-from imgquad_core.errors import InputError
+from .triangulators import TRIANGULATORS, triangulator_used
 
-from .triangulation import triangulator_used
+if TYPE_CHECKING:
+    from imgquad_core.arrays import Floats, Labels
 
 STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
 
@@ -26,6 +25,11 @@ class Effort(NamedTuple):
     again_below: float  #: a face on stride 4 with a worse element is meshed on stride 2 as well
     slides: int  #: rounds in which boundary nodes slide along their chains
     in_nine: bool = False  #: whether very wide faces are meshed on stride 6 and their quads split in nine
+
+    @property
+    def edge_multiple(self) -> Literal[4, 12]:
+        """Number of edges of which long boundaries should have a multiple, so that both sides can be split evenly."""
+        return 12 if self.in_nine else 4
 
 
 EFFORTS: Mapping[str, Effort] = {
@@ -72,29 +76,22 @@ class MeshingOptions:
         For tests and studies.
     """
 
-    size: float = 4.0
-    growth: float = 1.3
-    material_sizes: Mapping[int, float] | None = field(default=None)
-    effort: str = "normal"
-    threads: int = 1
-    triangulator: str = "auto"
+    size: float = SIZE.field()
+    growth: float = GROWTH.field()
+    material_sizes: Mapping[int, float] | None = MATERIAL_SIZES.field()
+    effort: str = EFFORT.field()
+    threads: int = THREADS.field()
+    triangulator: str = option(
+        "auto",
+        "who makes the Delaunay triangles that quads come from: Triangle (not for commercial use), CDT, or auto: "
+        "Triangle where it is installed, else CDT",
+        choices=TRIANGULATORS,
+    )
     tuning: Tuning = field(default=TUNING, metadata={"internal": True})  # no user's business: no filter has it
 
     def __post_init__(self) -> None:
-        sizes = {"size": self.size} | {f"size of material {k}": v for k, v in self._sizes().items()}
-        for name, value in sizes.items():
-            if not 0.05 <= value < float("inf"):
-                raise InputError(f"{name} is {value}; give a length of at least 0.05 px")
-        if not 1.01 <= self.growth <= 10.0:
-            raise InputError(f"growth is {self.growth}; give a ratio from 1.01 to 10")
-        if self.effort not in EFFORTS:
-            raise InputError(f"effort is {self.effort!r}; give one of {', '.join(EFFORTS)}")
-        if self.threads < 1:
-            raise InputError(f"threads is {self.threads}; give at least 1")
+        check(self)
         triangulator_used(self.triangulator)
-
-    def _sizes(self) -> Mapping[int, float]:
-        return self.material_sizes or {}
 
     @property
     def slope(self) -> float:
@@ -103,7 +100,9 @@ class MeshingOptions:
 
     def face_sizes(self, labels: Labels) -> Floats:
         """Return the edge length asked for in each face."""
+        import numpy as np  # not above: the command's help is made of these options
+
         sizes = np.full(len(labels), float(self.size))
-        for label, size in self._sizes().items():
+        for label, size in (self.material_sizes or {}).items():
             sizes[labels == label] = size
         return sizes

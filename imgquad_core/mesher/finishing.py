@@ -8,9 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats
-from imgquad_core.cleanup.batches import Portions, in_threads, is_large
+from imgquad_core.cleanup.batches import in_threads, is_large
 from imgquad_core.cleanup.faces import INNER_VALENCE, FaceQuads, wanted_quads
-from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
+from imgquad_core.cleanup.irregular_nodes import clean_up
+from imgquad_core.cleanup.options import CleanUp, Portions
 from imgquad_core.cleanup.relaxation import BAD, GOOD, Rings, fit_rim, laplace, newton, rings_of, untangle
 from imgquad_core.cleanup.strips import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
 from imgquad_core.cleanup.worst_quads import repair

@@ -16,8 +16,9 @@ import numpy as np
 from imgquad_core import ahead
 from imgquad_core.arrays import Flags, Labels
 from imgquad_core.chains import without_unused_points
-from imgquad_core.cleanup.batches import Portions, in_threads
+from imgquad_core.cleanup.batches import in_threads
 from imgquad_core.cleanup.faces import FaceQuads, joined
+from imgquad_core.cleanup.options import Portions
 from imgquad_core.cleanup.relaxation import GOOD, newton, rings_of, untangle
 from imgquad_core.cleanup.sliding import slide
 from imgquad_core.cleanup.strips import independent_nodes, strips_of

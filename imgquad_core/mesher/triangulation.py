@@ -7,18 +7,15 @@ they never see any here, and what they return is checked.
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints
-from imgquad_core.errors import InputError, TopologyError
+from imgquad_core.errors import TopologyError
 from imgquad_core.jit import kernel
 
-_PACKAGES = {"triangle": "triangle", "cdt": "pythoncdt"}  # of each triangulator, the default one first
-TRIANGULATORS = ("auto", *_PACKAGES)
+from .triangulators import triangulator_used
 
 # of the background of CDT; study: 14 pictures, four values of each give the same quality within 3 %
 LONGEST = 1.2  # length wanted far from constraints, over the root of the largest area; an edge of it has 1.52
@@ -71,42 +68,6 @@ def find_edges(table: Constraints, tail: Ints, head: Ints) -> Ints:
         same = table.head[at] == head[todo]
         place[todo[same]] = at[same]
     return place
-
-
-def triangulator_used(asked: str = "auto") -> str:
-    """Return which triangulator stands behind what was asked for.
-
-    Parameters
-    ----------
-    asked : {"auto", "triangle", "cdt"}
-        `auto` is Triangle where it is installed, else CDT.
-
-    Returns
-    -------
-    {"triangle", "cdt"}
-
-    Raises
-    ------
-    InputError
-        If there is no such triangulator, or it is not installed.
-    """
-    if asked not in TRIANGULATORS:
-        raise InputError(f"triangulator is {asked!r}; give one of {', '.join(TRIANGULATORS)}")
-    wanted = list(_PACKAGES) if asked == "auto" else [asked]
-    found = next((name for name in wanted if _is_installed(_PACKAGES[name])), None)
-    if found is None:
-        packages = " or ".join(_PACKAGES[name] for name in reversed(wanted))
-        raise InputError(f"triangulator is {asked!r}, but its Python package is missing: pip install {packages}")
-    return found
-
-
-@cache
-def _is_installed(package: str) -> bool:
-    try:
-        import_module(package)
-    except ImportError:
-        return False
-    return True
 
 
 def triangulate(points: Floats, segments: Ints, max_area: float | None = None, triangulator: str = "auto") -> Triangles:

@@ -8,7 +8,8 @@ import numpy as np
 def compile_last_stages() -> None:
     """Compile the optimisation of quads, by using it on one."""
     from imgquad_core.cleanup.faces import FaceQuads
-    from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
+    from imgquad_core.cleanup.irregular_nodes import clean_up
+    from imgquad_core.cleanup.options import CleanUp
     from imgquad_core.cleanup.relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, untangle
     from imgquad_core.cleanup.sliding import slide
     from imgquad_core.cleanup.worst_quads import repair

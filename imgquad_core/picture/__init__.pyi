@@ -1,8 +1,9 @@
-from .noise import DenoiseOptions, Removal, automatic_limits, list_removed, remove_noise
+from .noise import Removal, automatic_limits, list_removed, remove_noise
+from .options import DenoiseOptions, ReadOptions, SegmentationOptions
 from .picture import Picture, picture_of
-from .reading import ReadOptions, read_picture
-from .segmentation import Segmentation, SegmentationOptions, segment_picture
-from .selection import Box, assert_solid, crop_image, drop_materials, material_number
+from .reading import read_picture
+from .segmentation import Segmentation, segment_picture
+from .selection import Box, assert_solid, crop_image, drop_materials, material_number, sizes_by_number
 
 __all__ = [
     "Box",
@@ -22,4 +23,5 @@ __all__ = [
     "read_picture",
     "remove_noise",
     "segment_picture",
+    "sizes_by_number",
 ]

@@ -7,7 +7,6 @@ characteristic length is below `min_length`; both together spare veins and crack
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -19,38 +18,7 @@ from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage
 
 from .clusters import Clusters, find, join, labelled_clusters
-
-
-@dataclass(frozen=True)
-class DenoiseOptions:
-    """What counts as noise.
-
-    Parameters
-    ----------
-    min_pixels : int
-        Clusters of this many pixels or more stay. 0 or 1: nothing is removed.
-    min_length : float
-        Clusters of this characteristic length or more stay, in pixels. 0: nothing is removed.
-    policy : {"minority", "majority", "lower", "diagonal", "junction"}
-        What is connected over an ambiguous corner of four pixels: the same as in `ExtractionOptions`.
-    """
-
-    min_pixels: int = 0
-    min_length: float = 0.0
-    policy: str = "minority"
-
-    def __post_init__(self) -> None:
-        policy_code(self.policy)
-        for name, value in (("min_pixels", self.min_pixels), ("min_length", self.min_length)):
-            if not (isfinite(value) and value >= 0):
-                raise InputError(f"{name} is {value}: give a number of pixels, 0 or more (0 switches it off)")
-        if self.min_pixels != int(self.min_pixels):
-            raise InputError(f"min_pixels is {self.min_pixels}: give a whole number of pixels")
-
-    @property
-    def removes(self) -> bool:
-        """Whether any cluster can be noise: a single pixel has the length 1."""
-        return self.min_pixels > 1 and self.min_length > 1
+from .options import DenoiseOptions
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,33 +14,12 @@ from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
 
+from .options import ReadOptions
 from .picture import Picture, picture_of
 
 __all__ = ["Picture", "ReadOptions", "picture_of", "read_picture"]
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "DIB", "PPM", "GIF", "WEBP")
 KNOWN = "PNG, JPEG, TIFF, BMP, PPM/PGM/PBM, GIF, WebP or NPY"
-
-
-@dataclass(frozen=True)
-class ReadOptions:
-    """How a file is read.
-
-    Parameters
-    ----------
-    max_pixels : int
-        Larger pictures are refused before they are decoded (decompression bombs).
-    frame : int, optional
-        Which picture of a stack (TIFF pages, animation frames, first axis of a NPY array), counted from 0.
-    """
-
-    max_pixels: int = 100_000_000
-    frame: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.max_pixels < 1:
-            raise InputError(f"max_pixels is {self.max_pixels}: give 1 or more")
-        if self.frame is not None and self.frame < 0:
-            raise InputError(f"frame is {self.frame}: frames are counted from 0")
 
 
 def read_picture(path: str | Path, options: ReadOptions | None = None) -> Picture:

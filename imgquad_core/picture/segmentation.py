@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,6 +15,7 @@ from imgquad_core.model import VOID, LabelImage, Materials
 
 from .blends import find_rims, relabel_rims
 from .exact_colours import dark_to_light, exact_labels
+from .options import SegmentationOptions
 from .picture import Picture, picture_of
 from .quantisation import (
     MOST_CLASSES,
@@ -35,36 +35,6 @@ ANY_NUMBER = 1 << 40
 #: noise (standard deviation, in levels of 256) from which a picture is median filtered
 NOISY = 0.5
 Levels = Bytes
-
-
-@dataclass(frozen=True)
-class SegmentationOptions:
-    """How colours become materials.
-
-    Parameters
-    ----------
-    colors : "auto", "exact", int or sequence of RGB
-        "exact": one material per distinct value or colour. A number: quantised to that many colours. A palette (RGB, 0
-        to 255): each pixel takes the nearest colour of it. "auto": exact where the picture has at most 32 colours or
-        holds labels, else quantised to a number that is chosen from the histogram.
-    drop_transparent : bool
-        Whether pixels of alpha 0 become `VOID`.
-    """
-
-    colors: str | int | Sequence[Sequence[int]] = "auto"
-    drop_transparent: bool = False
-
-    def __post_init__(self) -> None:
-        if isinstance(self.colors, str):
-            if self.colors not in ("auto", "exact"):
-                raise InputError(f"colors is '{self.colors}': give auto, exact, a number of colours or a list of RGB")
-        elif isinstance(self.colors, (int, np.integer)):
-            if not 1 <= self.colors <= 256 or isinstance(self.colors, bool):
-                raise InputError(f"colors is {self.colors}: give a number of colours from 1 to 256")
-        else:
-            palette = np.array(self.colors, dtype=float)
-            if palette.ndim != 2 or palette.shape[1] != 3 or not ((palette >= 0) & (palette <= 255)).all():
-                raise InputError(f"colors is {self.colors}: give a palette as rows of R, G, B from 0 to 255")
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,11 @@ def material_number(materials: Materials, material: str | int) -> int:
         problem = f"{len(found)} materials have this name, give the number" if found else "there is no such material"
         raise InputError(f"material '{material}': {problem}; there are {known}")
     return found[0]
+
+
+def sizes_by_number(materials: Materials, sizes: Mapping[Any, float]) -> dict[int, float]:
+    """Return sizes of materials, given by name or number, by number."""
+    return {material_number(materials, name): size for name, size in sizes.items()}
 
 
 def crop_image(image: LabelImage, box: Box) -> LabelImage:

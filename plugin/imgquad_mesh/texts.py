@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
 
+from imgquad_core.declared import Declaration
 from imgquad_core.errors import InputError
 
 from .spec import Filter, Value
@@ -22,6 +23,11 @@ class Text(NamedTuple):
 
     read: Callable[[str], Any]
     write: Callable[[Any], str]
+    form: str  #: of the text, as the command's help shows it
+    script: str = ""  #: how scripts write it: a sentence for filters.xml
+    flag: str = ""  #: on the command, where it is repeatable: name of the option,
+    item: Callable[[str], Any] | None = None  #: what one of it reads,
+    gather: Callable[[list[Any]], Any] = tuple  #: and the option that all of them make
 
 
 def _items(text: str) -> list[str]:
@@ -50,13 +56,26 @@ def _write_sizes(sizes: Mapping[Any, float] | None) -> str:
 
 
 def _cohesive(text: str) -> str | tuple[tuple[str, str], ...] | None:
-    read = [pair(item) for item in _items(text)]
+    return _gathered_pairs([pair(item) for item in _items(text)])
+
+
+def _gathered_pairs(read: list[str | tuple[str, str]]) -> str | tuple[tuple[str, str], ...] | None:
     pairs = tuple(pair for pair in read if not isinstance(pair, str))
     return "all" if "all" in read else pairs or None
 
 
 def _write_cohesive(pairs: Any) -> str:
     return pairs if isinstance(pairs, str) else _joined(f"{a}:{b}" for a, b in pairs or ())
+
+
+def _write_sides(size: float | tuple[float, float]) -> str:
+    return ",".join(map("{:g}".format, size)) if isinstance(size, tuple) else f"{size:g}"
+
+
+def sides(text: str) -> float | tuple[float, float]:
+    """Return what --pixel-size asks for."""
+    width, comma, height = text.partition(",")
+    return (number(width), number(height)) if comma else number(width)
 
 
 def colors(text: str) -> str | int | list[tuple[int, int, int]]:
@@ -122,22 +141,63 @@ def pair(text: str) -> str | tuple[str, str]:
     return a, b
 
 
-_LENGTH_OR_AUTO = Text(
-    lambda text: None if text == "auto" else number(text), lambda v: "auto" if v is None else repr(v)
-)
-#: by name of the field
+def _none_or(read: Callable[[str], Any], none: str) -> Callable[[str], Any]:
+    return lambda text: None if text == none else read(text)
+
+
+def _write_or(write: Callable[[Any], str], none: str) -> Callable[[Any], str]:
+    return lambda value: none if value is None else write(value)
+
+
+_QUOTED = "a name that holds a comma stands in double quotes"
+#: by name of the field: options that are no plain number, flag or choice
 TEXTS: Mapping[str, Text] = {
-    "colors": Text(colors, _write_colors),
-    "min_pixels": Text(whole_or_auto, str),
-    "min_length": Text(real_or_auto, lambda v: v if isinstance(v, str) else repr(v)),
-    "boundary_size": _LENGTH_OR_AUTO,
-    "material_sizes": Text(_sizes, _write_sizes),
-    "drop": Text(lambda text: tuple(_items(text)), lambda names: _joined(map(str, names))),
-    "frame": Text(lambda text: whole(text) if text else None, lambda v: "" if v is None else str(v)),
-    "cohesive": Text(_cohesive, _write_cohesive),
-    "extrude": Text(lambda text: number(text) if text else None, lambda v: "" if v is None else repr(v)),
-    "crop": Text(lambda text: box(text) if text else None, lambda box: ",".join(map(str, box)) if box else ""),
+    "colors": Text(colors, _write_colors, "auto|exact|N|#rrggbb,#rrggbb", "A palette is written '#rrggbb,#rrggbb'."),
+    "min_pixels": Text(whole_or_auto, str, "auto|N"),
+    "min_length": Text(real_or_auto, lambda v: v if isinstance(v, str) else repr(v), "auto|LENGTH"),
+    "boundary_size": Text(_none_or(number, "auto"), _write_or(repr, "auto"), "LENGTH", "auto: as inside."),
+    "material_sizes": Text(
+        _sizes,
+        _write_sizes,
+        "MATERIAL=LENGTH",
+        f"Written quartz=2,7=1; {_QUOTED} with its size.",
+        "size-of",
+        size_of,
+        dict,
+    ),
+    "pixel_size": Text(sides, _write_sides, "LENGTH|WIDTH,HEIGHT", "Written 0.5, or 0.5,0.7."),
+    "drop": Text(
+        lambda text: tuple(_items(text)),
+        lambda names: _joined(map(str, names)),
+        "MATERIAL",
+        f"Separated by commas; {_QUOTED}.",
+        "drop",
+        str,
+    ),
+    "frame": Text(_none_or(whole, ""), _write_or(str, ""), "N", "Empty: there is one only."),
+    "cohesive": Text(
+        _cohesive,
+        _write_cohesive,
+        "A:B|all",
+        "Written quartz:pyrite,quartz:mica. Empty: none.",
+        "cohesive",
+        pair,
+        _gathered_pairs,
+    ),
+    "extrude": Text(_none_or(number, ""), _write_or(repr, ""), "THICKNESS", "Empty: the mesh stays flat."),
+    "crop": Text(
+        _none_or(box, ""),
+        _write_or(lambda box: ",".join(map(str, box)), ""),
+        "X0,Y0,X1,Y1",
+        "Written X0,Y0,X1,Y1. Empty: all of it.",
+    ),
 }
+
+
+def help_in_scripts(name: str, declaration: Declaration) -> str:
+    """Return what filters.xml says of an option."""
+    how = TEXTS[name].script if name in TEXTS else ""
+    return f"{declaration.text} {how}".rstrip()
 
 
 def options_from(kind: type[T], spec: Filter, values: Mapping[str, Any]) -> T:

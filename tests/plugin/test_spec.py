@@ -14,10 +14,11 @@ from typing import Any
 
 import pytest
 
+from imgquad_core.declared import declarations
 from imgquad_core.errors import InputError
 from imgquad_mesh.meshlab.steps import STEPS
 from imgquad_mesh.spec import Filter, filters, filters_file, find_filter, python_name, read_filters
-from imgquad_mesh.texts import TEXTS, options_from, values_of
+from imgquad_mesh.texts import TEXTS, help_in_scripts, options_from, values_of
 from support import ROOT
 
 XML = (ROOT / "filters.xml").read_text(encoding="utf-8")
@@ -115,6 +116,50 @@ def test_every_filter_has_a_step_and_every_step_a_filter() -> None:
 @pytest.mark.parametrize("function", STEPS)
 def test_parameters_and_defaults_are_those_of_the_options(function: str) -> None:
     assert differences(filters()[function], STEPS[function].options) == []
+
+
+def said_differently(spec: Filter, options: Any) -> list[str]:
+    """What filters.xml and a declaration say differently of kind, limits, choices and help."""
+    found = []
+    for p in spec.parameters:
+        declared = declarations(options)[p.field]
+        in_range = declared.least is not None and declared.most is not None
+        kind = {bool: "Boolean", int: "Int", float: "Real"}.get(declared.kind, "String")
+        if p.field in TEXTS and p.kind == "String":
+            kind = "String"
+        elif declared.choices and isinstance(declared.choices[0], str):
+            kind = "Enum"
+        should = {
+            "kind": kind,
+            "choices": declared.choices if kind == "Enum" else (),
+            "low": declared.least if in_range and p.kind != "String" else None,
+            "high": declared.most if in_range and p.kind != "String" else None,
+            "help": help_in_scripts(p.field, declared),
+        }
+        found += [f"{p.name}: {key} should be {value!r}" for key, value in should.items() if getattr(p, key) != value]
+    return found
+
+
+@pytest.mark.parametrize("function", STEPS)
+def test_kinds_limits_and_help_are_those_declared(function: str) -> None:
+    assert said_differently(filters()[function], STEPS[function].options) == []
+
+
+@pytest.mark.parametrize(
+    ("was", "is_now", "found"),
+    [
+        ('guiMin="1.01" guiMax="10"', 'guiMin="1.01" guiMax="9"', "growth: high should be 10.0"),
+        ("{fast: 0 | normal: 1 | best: 2}", "{fast: 0 | normal: 1}", "effort: choices should be"),
+        ("Length of the final edges, in pixels.", "Length of edges in px, at the end.", "size: help should be"),
+        ('"threads" parType="Int"', '"threads" parType="Real"', "threads: kind should be 'Int'"),
+    ],
+)
+def test_a_limit_changed_in_filters_xml_only_is_found(tmp_path: Path, was: str, is_now: str, found: str) -> None:
+    assert was in XML
+    (tmp_path / "filters.xml").write_text(XML.replace(was, is_now), encoding="utf-8")
+    changed = read_filters(tmp_path / "filters.xml")["generate_quad_mesh_from_image"]
+    differences = said_differently(changed, STEPS["generate_quad_mesh_from_image"].options)
+    assert any(each.startswith(found) for each in differences), differences
 
 
 def test_a_default_changed_in_filters_xml_only_is_found(tmp_path: Path) -> None:
@@ -222,14 +267,10 @@ def run_parser() -> argparse.ArgumentParser:
     return chosen.choices["run"]
 
 
-#: options of the command that have another name than the field
-_COMMAND_NAMES = {"material_sizes": "size_of"}
-
-
 def test_command_has_an_option_for_each_parameter_and_tells_its_default() -> None:
     options = {a.dest: a for a in run_parser()._actions}
     for p in filters()["generate_quad_mesh_from_image"].parameters:
-        action = options[_COMMAND_NAMES.get(p.field, p.field)]
+        action = options[p.field]
         assert action.default is None, "the default is that of MeshOptions, in one place"
         if p.choices and action.choices:
             assert tuple(action.choices) == p.choices
@@ -239,7 +280,7 @@ def test_command_has_an_option_for_each_parameter_and_tells_its_default() -> Non
 
 
 def test_command_has_no_mesh_option_that_filters_xml_does_not_know() -> None:
-    known = {_COMMAND_NAMES.get(p.field, p.field) for p in filters()["generate_quad_mesh_from_image"].parameters}
+    known = {p.field for p in filters()["generate_quad_mesh_from_image"].parameters}
     groups = {g.title: g for g in run_parser()._action_groups}
     for title in ("picture", "noise", "boundaries", "mesh"):
         assert {a.dest for a in groups[title]._group_actions} <= known

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from imgquad_core.errors import InputError
-from imgquad_mesh.texts import number, pair
+from imgquad_core.fe import ElementOptions
+from imgquad_mesh.texts import number
 
-if TYPE_CHECKING:
-    from imgquad_core.fe.elements import ElementOptions
+from .declared_options import add_declared, asked
 
 #: options of the command that a writer takes under the same name
 WRITER_OPTIONS = ("analysis", "reduced", "thickness", "properties", "deck", "regions", "interfaces", "version")
@@ -18,13 +18,7 @@ WRITER_OPTIONS = ("analysis", "reduced", "thickness", "properties", "deck", "reg
 
 def add_element_options(parser: argparse.ArgumentParser) -> None:
     """Add what makes an `ElementOptions` and the options of the writers."""
-    add = parser.add_argument_group("elements").add_argument
-    add("--order", type=int, choices=(1, 2), default=1, help="2: nodes in the middles of sides, on the curves")
-    add("--nodes", type=int, choices=(8, 9), default=8, help="of a quad of order 2 (default: 8)")
-    add("--cohesive", type=pair, action="append", metavar="A:B|all", help="split the interface of two materials; ...")
-    add("--extrude", type=number, metavar="THICKNESS", help="hexes of this thickness, in the unit of the mesh")
-    add("--layers", type=int, default=1, metavar="N", help="hexes over the thickness (default: 1)")
-
+    add_declared(parser, ElementOptions)
     add = parser.add_argument_group("solver files").add_argument
     add("--analysis", metavar="NAME", help="'plane stress' (default), 'plane strain', axisymmetric, heat: .inp .bdf")
     add("--reduced", action="store_true", default=None, help="reduced integration (CPS4R ...): .inp")
@@ -42,13 +36,8 @@ def add_element_options(parser: argparse.ArgumentParser) -> None:
 
 def element_options(args: argparse.Namespace) -> ElementOptions:
     """Return the elements that `args` asks for."""
-    from imgquad_core.fe.elements import ElementOptions
-
-    pairs = args.cohesive
-    cohesive = None if pairs is None else "all" if "all" in pairs else pairs
     periodic = None if args.periodic in (None, "none") else args.periodic
-    sides = args.interfaces == "sides"
-    return ElementOptions(args.order, args.nodes, cohesive, args.extrude, args.layers, periodic, sides)
+    return ElementOptions(**asked(args, ElementOptions), periodic=periodic, open_interfaces=args.interfaces == "sides")
 
 
 def writer_options(args: argparse.Namespace) -> dict[str, Any]:

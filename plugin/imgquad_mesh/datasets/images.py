@@ -9,9 +9,9 @@ import pyvista as pv
 from numpy.typing import NDArray
 from pyvista.core.errors import MissingDataError
 
+import imgquad_core as core
 from imgquad_core.errors import InputError
 from imgquad_core.model import LabelImage
-from imgquad_core.picture.segmentation import Segmentation, SegmentationOptions, segment_picture
 
 from .fields import materials_of, put_materials
 from .placement import Placement
@@ -93,22 +93,22 @@ def _pixel_counts(image: pv.ImageData, association: str) -> tuple[int, int, int]
 
 
 def segmented(
-    image: pv.ImageData, scalars: str | None = None, options: SegmentationOptions | None = None
-) -> Segmentation:
+    image: pv.ImageData, scalars: str | None = None, options: core.picture.SegmentationOptions | None = None
+) -> core.picture.Segmentation:
     """Return the materials of an image: those it has already, else found in its scalars."""
     name, _ = scalars_of(image, scalars)
-    values, options = image_array(image, name), options or SegmentationOptions()
+    values, options = image_array(image, name), options or core.picture.SegmentationOptions()
     if name != MATERIAL or "material_numbers" not in image.field_data or options.colors not in ("auto", "exact"):
-        return segment_picture(values, options)
+        return core.picture.segment_picture(values, options)
     materials = materials_of(image)
     unknown = np.setdiff1d(values, [-1, *materials.labels])
     if len(unknown):
         raise InputError(f"array 'material' holds {unknown[0]}, 'material_numbers' does not: segment the image anew")
     quantised = QUANTISED in image.field_data and bool(image.field_data[QUANTISED].any())
-    return Segmentation(LabelImage(values, materials), quantised)
+    return core.picture.Segmentation(LabelImage(values, materials), quantised)
 
 
-def with_materials(image: pv.ImageData, found: Segmentation, scalars: str | None = None) -> pv.ImageData:
+def with_materials(image: pv.ImageData, found: core.picture.Segmentation, scalars: str | None = None) -> pv.ImageData:
     """Return a copy of an image with the array `material` (int32, active; -1: none) where its scalars are."""
     _, association = scalars_of(image, scalars)
     out = image.copy()

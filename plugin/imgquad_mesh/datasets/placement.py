@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,18 @@ class Placement:
     def pixel_size(self) -> float:
         """Length of the shorter side of a pixel."""
         return float(np.linalg.norm(self.axes, axis=1).min())
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Width and height of a pixel."""
+        width, height = np.linalg.norm(self.axes, axis=1).tolist()
+        return width, height
+
+    def divided(self, shape: tuple[int, int], into: tuple[int, int]) -> Placement:
+        """Return where squares lie, `into` (height, width) of which cover what `shape` pixels do."""
+        if shape == into:
+            return self
+        return replace(self, axes=self.axes * (np.array(shape[::-1]) / np.array(into[::-1]))[:, None])
 
     def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return points in space, shape (n, 3), of points in pixels, shape (n, 2)."""

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pyvista as pv
 
+import imgquad_core as core
+from imgquad_mesh.datasets.grids import flattened, quads_of, to_fe_grid, to_grid, to_mesh
+from imgquad_mesh.datasets.lines import chain_lines
 from imgquad_mesh.progress import progress_of
+
+from .parameters import checked, choice
+from .plotting import MEASURES, add_to_plotter
 
 Effort: TypeAlias = Literal["fast", "normal", "best"]
 Grid: TypeAlias = "pv.UnstructuredGrid | pv.PolyData"
@@ -36,16 +43,11 @@ def optimize(
     pyvista.UnstructuredGrid
         As `mesh` gives it. Other arrays are not carried: points and cells are new.
     """
-    from imgquad_core.cleanup.optimization import OptimizationOptions, optimize
-    from imgquad_mesh.datasets.grids import to_grid, to_mesh
-
-    from .parameters import checked
-
-    options = OptimizationOptions(**checked(effort=effort, threads=threads))
+    options = core.cleanup.OptimizationOptions(**checked(effort=effort, threads=threads))
     with progress_of(progress_bar) as begin:
         begin("mesh")
         given, plane = to_mesh(grid)
-        return to_grid(optimize(given, options), plane)
+        return to_grid(core.cleanup.optimize(given, options), plane)
 
 
 def quality(grid: Grid) -> Grid:
@@ -67,15 +69,12 @@ def quality(grid: Grid) -> Grid:
     --------
     pyvista.DataObjectFilters.cell_quality
     """
-    from imgquad_core.measures.quality import aspect, corner_angles, scaled_jacobian
-    from imgquad_mesh.datasets.grids import flattened, quads_of
-
     corners, (points, _) = quads_of(grid), flattened(grid)
-    angles = corner_angles(points, corners)
+    angles = core.measures.corner_angles(points, corners)
     out = grid.copy()
-    out.cell_data["scaled_jacobian"] = scaled_jacobian(points, corners)
+    out.cell_data["scaled_jacobian"] = core.measures.scaled_jacobian(points, corners)
     out.cell_data["min_angle"], out.cell_data["max_angle"] = angles.min(axis=1), angles.max(axis=1)
-    out.cell_data["aspect"] = aspect(points, corners)
+    out.cell_data["aspect"] = core.measures.aspect(points, corners)
     out.point_data["valence"] = np.bincount(corners.ravel(), minlength=grid.n_points).astype(np.int32)
     out.set_active_scalars("scaled_jacobian", preference="cell")
     return out
@@ -95,11 +94,6 @@ def report(grid: Grid) -> dict[str, Any]:
         The fields of `imgquad_core.measures.QualityReport`, and under ``materials`` for each name its ``number``,
         ``quads``, ``regions`` and ``area`` (in the unit of the points, squared).
     """
-    from dataclasses import asdict
-
-    from imgquad_core.measures.quality import material_areas, quality_report
-    from imgquad_mesh.datasets.grids import to_mesh
-
     made, _ = to_mesh(grid)
     materials = {
         made.materials.name_of(number): {
@@ -108,9 +102,9 @@ def report(grid: Grid) -> dict[str, Any]:
             "regions": int(np.count_nonzero(made.region_label == number)),
             "area": area,
         }
-        for number, area in material_areas(made).items()
+        for number, area in core.measures.material_areas(made).items()
     }
-    return asdict(quality_report(made)) | {"materials": materials}
+    return asdict(core.measures.quality_report(made)) | {"materials": materials}
 
 
 def boundaries_of_mesh(grid: Grid) -> pv.PolyData:
@@ -127,9 +121,6 @@ def boundaries_of_mesh(grid: Grid) -> pv.PolyData:
         One polyline for each chain between two junctions, or closed, with the arrays ``boundary_labels``, ``chain`` and
         ``point_kind`` as `boundaries` gives them.
     """
-    from imgquad_mesh.datasets.grids import to_mesh
-    from imgquad_mesh.datasets.lines import chain_lines
-
     made, plane = to_mesh(grid)
     left_right = np.append(made.region_label, np.int32(-1))[made.chain_regions]
     used, ids = np.unique(made.chain_points, return_inverse=True)
@@ -151,11 +142,8 @@ def quadratic(grid: Grid, nodes: Literal[8, 9] = 8) -> pv.UnstructuredGrid:
     pyvista.UnstructuredGrid
         VTK_QUADRATIC_QUAD or VTK_BIQUADRATIC_QUAD cells, and the sets of the mesh as point arrays.
     """
-    from imgquad_core.fe.elements import ElementOptions, make_elements
-    from imgquad_mesh.datasets.grids import to_fe_grid, to_mesh
-
     made, plane = to_mesh(grid)
-    out = to_fe_grid(make_elements(made, ElementOptions(order=2, nodes=nodes)))
+    out = to_fe_grid(core.fe.make_elements(made, core.fe.ElementOptions(order=2, nodes=nodes)))
     out.points = plane.place(np.asarray(out.points)[:, :2])
     return out
 
@@ -197,11 +185,7 @@ def plot(
     Any
         What :meth:`pyvista.Plotter.show` returns, or `plotter`.
     """
-    import pyvista_validation as _validation
-
-    from .plotting import MEASURES, add_to_plotter
-
-    _validation.check_contains(["material", *MEASURES], must_contain=scalars, name="scalars")
+    choice(scalars, "scalars", ["material", *MEASURES])
     target = plotter or pv.Plotter(off_screen=off_screen, window_size=window_size)
     marked = scalars != "material" if irregular is None else irregular
     add_to_plotter(target, quality(grid), scalars, marked, show_edges, **kwargs)

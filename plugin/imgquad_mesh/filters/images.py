@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pyvista as pv
+from numpy.typing import NDArray
 
+import imgquad_core as core
+from imgquad_mesh.datasets import grids, images, lines
 from imgquad_mesh.progress import progress_of
 
 from .grids import Effort
+from .parameters import checked
 
 Auto: TypeAlias = Literal["auto"]
 Unit: TypeAlias = Literal["pixels", "world"]
@@ -65,15 +70,11 @@ def segment(
     >>> image.imgquad.segment().field_data["material_numbers"]
     pyvista_ndarray([  0, 200], dtype=int32)
     """
-    from imgquad_core.picture.segmentation import SegmentationOptions
-    from imgquad_mesh.datasets.images import segmented, with_materials
-
-    from .parameters import checked
-
     values = checked(colors=colors, drop_transparent=drop_transparent)
     with progress_of(progress_bar) as begin:
         begin("segment")
-        return with_materials(image, segmented(image, scalars, SegmentationOptions(**values)), scalars)
+        found = images.segmented(image, scalars, core.picture.SegmentationOptions(**values))
+        return images.with_materials(image, found, scalars)
 
 
 def remove_noise(
@@ -109,12 +110,10 @@ def remove_noise(
     pyvista.ImageData
         A copy with a new array ``material``.
     """
-    from imgquad_mesh.datasets.images import segmented, with_materials
-
     with progress_of(progress_bar) as begin:
         begin("denoise")
-        found = _without_noise(segmented(image, scalars), min_pixels, min_length, policy)
-        return with_materials(image, found, scalars)
+        found = _without_noise(images.segmented(image, scalars), min_pixels, min_length, policy)
+        return images.with_materials(image, found, scalars)
 
 
 def drop_materials(
@@ -136,17 +135,10 @@ def drop_materials(
     pyvista.ImageData
         A copy with a new array ``material``.
     """
-    from dataclasses import replace
-
-    from imgquad_core.picture.selection import drop_materials as drop
-    from imgquad_mesh.datasets.images import segmented, with_materials
-
-    from .parameters import checked
-
     names = [materials] if isinstance(materials, (str, int)) else materials
-    found = segmented(image, scalars)
+    found = images.segmented(image, scalars)
     chosen = checked(materials=names)["materials"]
-    return with_materials(image, replace(found, image=drop(found.image, chosen)), scalars)
+    return images.with_materials(image, replace(found, image=core.picture.drop_materials(found.image, chosen)), scalars)
 
 
 def boundaries(
@@ -174,17 +166,12 @@ def boundaries(
         the left and right, -1 for none, as in :meth:`pyvista.ImageDataFilters.contour_labels`), ``boundary_regions``
         and ``chain``; point array ``point_kind`` (0 inside a chain, 1 junction, 2 on the border, 3 corner).
     """
-    from imgquad_core.boundary.extraction import ExtractionOptions
-    from imgquad_mesh.datasets.images import image_placement, segmented
-    from imgquad_mesh.datasets.lines import to_lines
-
-    from .parameters import checked
-    from .stages import extracted
-
-    options = ExtractionOptions(**checked(policy=policy))
+    options = core.boundary.ExtractionOptions(**checked(policy=policy))
     with progress_of(progress_bar) as begin:
         begin("boundary")
-        return to_lines(extracted(segmented(image, scalars).image, image_placement(image, scalars), options))
+        labels = images.segmented(image, scalars).image
+        graph = core.pipeline.extract(labels, options)
+        return lines.to_lines(lines.Boundaries(graph, labels.materials, images.image_placement(image, scalars)))
 
 
 def mesh(
@@ -287,62 +274,38 @@ def mesh(
     >>> mesh.bounds[:4]
     (-0.5, 59.5, -0.5, 39.5)
     """
-    from imgquad_core.boundary.extraction import ExtractionOptions
-    from imgquad_core.options import MeshOptions
-    from imgquad_core.picture.segmentation import SegmentationOptions
-    from imgquad_core.picture.selection import drop_materials as drop_from
-    from imgquad_core.pipeline import thin_features
-    from imgquad_mesh.datasets.grids import to_grid
-    from imgquad_mesh.datasets.images import image_placement, segmented
-
-    from .parameters import checked
-    from .stages import extracted, filled, smoothed
-
     sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
     values = checked(growth=growth, policy=policy, edge_ratio=edge_ratio, max_shift=max_shift, effort=effort)
     values |= checked(threads=threads, triangulator=triangulator, periodic=periodic)
+    values |= checked(min_pixels=min_pixels, min_length=min_length, drop=drop)
     early = checked(colors=colors, drop_transparent=drop_transparent)
-    last = checked(drop=drop, sample=sample)
-    placement = image_placement(image, scalars)
-    options = MeshOptions(**_in_pixels(sizes, unit, placement.pixel_size), **values)
-    columns = _columns(image, last["sample"], scalars)
+    placement = images.image_placement(image, scalars)
+    values |= in_pixels(sizes, unit, placement.pixel_size)
+    options = core.MeshOptions(**values, pixel_size=placement.sides)
+    columns = _columns(image, checked(sample=sample)["sample"], scalars)
     with progress_of(progress_bar) as begin:
         begin("segment")
-        found = segmented(image, scalars, SegmentationOptions(**early))
-        begin("denoise")
-        labels = drop_from(_without_noise(found, min_pixels, min_length, policy).image, last["drop"])
-        begin("boundary")
-        lines = extracted(labels, placement, ExtractionOptions(options.policy))
-        begin("smooth")
-        lines = smoothed(lines, options.smoothing(labels.materials), options.periodic)
-        begin("mesh")
-        made = filled(lines, options.meshing(labels.materials))
-    many = thin_features(labels, made, options)
+        found = images.segmented(image, scalars, core.picture.SegmentationOptions(**early))
+        done = core.pipeline.run(found, options, lambda stage, *_: begin(stage))
+    many = core.pipeline.thin_features(done.labels, done.pixel_mesh, options)
     if many:
         warnings.warn(many, stacklevel=3)  # of the caller of the accessor's method
-    grid = to_grid(made, lines.placement)
-    _sample(grid, made, columns, lines.graph.shape)
+    grid = grids.to_grid(done.pixel_mesh, placement.divided(done.labels.shape, done.boundary.shape))
+    _sample(grid, done.pixel_mesh, columns, done.boundary.shape)
     return grid
 
 
-def _without_noise(found: Any, min_pixels: Any, min_length: Any, policy: Any) -> Any:
-    """Return a segmentation without noise, with the limits of `imgquad_core.pipeline.MeshOptions`."""
-    from dataclasses import replace
-
-    from imgquad_core.options import MeshOptions
-    from imgquad_core.picture.noise import remove_noise
-
-    from .parameters import checked
-
-    options = MeshOptions(**checked(min_pixels=min_pixels, min_length=min_length, policy=policy))
+def _without_noise(
+    found: core.picture.Segmentation, min_pixels: int | Auto, min_length: float | Auto, policy: str
+) -> core.picture.Segmentation:
+    """Return a segmentation without noise, with the limits of `MeshOptions`."""
+    options = core.MeshOptions(**checked(min_pixels=min_pixels, min_length=min_length, policy=policy))
     noise = options.noise(found.quantised, found.image.shape)
-    return replace(found, image=remove_noise(found.image, noise), quantised=False)
+    return replace(found, image=core.picture.remove_noise(found.image, noise), quantised=False)
 
 
-def _in_pixels(sizes: dict[str, Any], unit: Unit, pixel_size: float) -> dict[str, Any]:
+def in_pixels(sizes: dict[str, Any], unit: Unit, pixel_size: float) -> dict[str, Any]:
     """Return sizes in pixels: a length, None, or lengths by material."""
-    from .parameters import checked
-
     if checked(unit=unit)["unit"] == "pixels":
         return sizes
     return {
@@ -352,28 +315,20 @@ def _in_pixels(sizes: dict[str, Any], unit: Unit, pixel_size: float) -> dict[str
     }  # fmt: skip
 
 
-def _numbered(sizes: Mapping[str | int, float], materials: Any) -> dict[int, float]:
-    from imgquad_core.picture.selection import material_number
-
-    return {material_number(materials, name): size for name, size in sizes.items()}
-
-
-def _columns(image: pv.ImageData, names: Sequence[str], scalars: str | None) -> dict[str, Any]:
+def _columns(image: pv.ImageData, names: Sequence[str], scalars: str | None) -> dict[str, NDArray[Any]]:
     """Return the arrays that are to be sampled, the top row first."""
-    from imgquad_mesh.datasets.images import image_array, scalars_of
-
-    _, association = scalars_of(image, scalars)
+    _, association = images.scalars_of(image, scalars)
     for name in names:
-        if scalars_of(image, name)[1] != association:
+        if images.scalars_of(image, name)[1] != association:
             raise KeyError(f"Data array ({name}) is not one of {association}s, as the scalars are: convert the image.")
-    return {name: image_array(image, name) for name in names}
+    return {name: images.image_array(image, name) for name in names}
 
 
-def _sample(grid: pv.UnstructuredGrid, made: Any, columns: Mapping[str, Any], shape: tuple[int, int]) -> None:
+def _sample(
+    grid: pv.UnstructuredGrid, made: core.QuadMesh, columns: Mapping[str, NDArray[Any]], shape: tuple[int, int]
+) -> None:
     """Put means of arrays over each quad into a grid, in place; `made` lies on a picture of `shape` (height, width)."""
-    from imgquad_core.measures.sampling import area_means
-
     for name, values in columns.items():
         to_pixels = np.array(values.shape[1::-1]) / np.array(shape[::-1])
-        grid.cell_data[name] = area_means(values, made.points * to_pixels, made.quads)
+        grid.cell_data[name] = core.measures.area_means(values, made.points * to_pixels, made.quads)
     grid.set_active_scalars("material", preference="cell")

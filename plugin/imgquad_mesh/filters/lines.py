@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import pyvista as pv
 
+import imgquad_core as core
 from imgquad_core.errors import InputError
+from imgquad_mesh.datasets.grids import to_grid
+from imgquad_mesh.datasets.lines import from_lines, to_lines
 from imgquad_mesh.progress import progress_of
 
 from .grids import Effort
-from .images import MaterialSizes, Periodic, Triangulator, Unit, _in_pixels, _numbered
+from .images import MaterialSizes, Periodic, Triangulator, Unit, in_pixels
+from .parameters import checked
 
 
 def smooth(
@@ -22,7 +26,7 @@ def smooth(
     growth: float = 1.3,
     edge_ratio: float = 1.2,
     max_shift: float = 1.0,
-    in_twelves: bool = False,
+    edge_multiple: Literal[4, 12] = 4,
     periodic: Periodic = "none",
     unit: Unit = "pixels",
     progress_bar: bool = False,
@@ -47,9 +51,9 @@ def smooth(
         Largest ratio of the lengths of neighbouring edges on a boundary.
     max_shift : float, default: 1.0
         How far a boundary moves at most, always in pixels.
-    in_twelves : bool, default: False
-        Very long boundaries get a multiple of twelve edges, up to 10 % off the size: with effort "best" the quads of
-        very wide regions are then split in nine.
+    edge_multiple : 4 | 12, default: 4
+        Very long boundaries get a multiple of this many edges, up to 10 % off the size: with 12 and effort "best" the
+        quads of very wide regions are then split in nine.
     periodic : "none" | "x" | "y" | "xy", default: "none"
         Opposite sides get nodes at the same places, for a periodic cell.
     unit : "pixels" | "world", default: "pixels"
@@ -62,23 +66,29 @@ def smooth(
     pyvista.PolyData
         The boundaries that are meshed, with the same arrays.
     """
-    from imgquad_core.boundary.smoothing import SmoothingOptions
-    from imgquad_mesh.datasets.lines import from_lines, to_lines
-
-    from .parameters import checked
-    from .stages import smoothed
-
-    values = checked(growth=growth, edge_ratio=edge_ratio, max_shift=max_shift, in_twelves=in_twelves)
+    values = checked(growth=growth, edge_ratio=edge_ratio, max_shift=max_shift, edge_multiple=edge_multiple)
     sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
     repeat = checked(periodic=periodic)["periodic"]
     given = from_lines(lines)
     if given.sizes is not None:
         raise InputError("these boundaries are smooth already: smooth those that image.imgquad.boundaries() gave")
-    sizes = _in_pixels(sizes, unit, given.placement.pixel_size)
-    sizes["material_sizes"] = _numbered(sizes["material_sizes"], given.materials)
+    sizes = in_pixels(sizes, unit, given.placement.pixel_size)
+    sizes["material_sizes"] = core.picture.sizes_by_number(given.materials, sizes["material_sizes"])
+    options = core.boundary.SmoothingOptions(**sizes, **values)
     with progress_of(progress_bar) as begin:
         begin("smooth")
-        return to_lines(smoothed(given, SmoothingOptions(**sizes, **values), repeat))
+        shape = given.graph.shape
+        graph = core.pipeline.smooth(
+            given.graph, options, core.boundary.true_shape(shape, given.placement.sides), repeat
+        )
+        return to_lines(
+            given._replace(
+                graph=graph,
+                placement=given.placement.divided(shape, graph.shape),
+                sizes=(options.size, options.growth, dict(options.material_sizes or {})),
+                periodic=repeat,
+            )
+        )
 
 
 def quads(
@@ -121,24 +131,18 @@ def quads(
     pyvista.UnstructuredGrid
         As `mesh` gives it.
     """
-    from imgquad_core.mesher.efforts import MeshingOptions
-    from imgquad_mesh.datasets.grids import to_grid
-    from imgquad_mesh.datasets.lines import from_lines
-
-    from .parameters import checked
-    from .stages import filled
-
     given = from_lines(lines)
     if given.sizes is None:
         raise InputError("these boundaries are not smoothed: call .imgquad.smooth(size=...) on them first")
     values: dict[str, Any] = dict(zip(("size", "growth", "material_sizes"), given.sizes, strict=True))
     asked = {"size": size, "material_sizes": material_sizes}
     sizes = checked(**{name: value for name, value in asked.items() if value is not None})
-    values |= _in_pixels(sizes, unit, given.placement.pixel_size)
-    values["material_sizes"] = _numbered(values["material_sizes"], given.materials)
+    values |= in_pixels(sizes, unit, given.placement.pixel_size)
+    values["material_sizes"] = core.picture.sizes_by_number(given.materials, values["material_sizes"])
     values |= checked(effort=effort, threads=threads, triangulator=triangulator)
     values |= {} if growth is None else checked(growth=growth)
-    options = MeshingOptions(**values)
+    options = core.mesher.MeshingOptions(**values)
     with progress_of(progress_bar) as begin:
         begin("mesh")
-        return to_grid(filled(given, options), given.placement)
+        _, made = core.pipeline.fill_boundaries(given.graph, options, given.materials, given.periodic)
+        return to_grid(made, given.placement)

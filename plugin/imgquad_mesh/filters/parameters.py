@@ -1,4 +1,4 @@
-"""Parameters of filters, refused the way PyVista refuses them: its own validation, the limits of filters.xml."""
+"""Parameters of filters, refused the way PyVista refuses them: by its own validation, within declared limits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import pyvista_validation
 
-from imgquad_mesh.spec import Parameter, filters
+from imgquad_core import MeshOptions
+from imgquad_core.boundary import SmoothingOptions
+from imgquad_core.declared import Declaration, declarations
 
 _validation: Any = pyvista_validation  # its overloads are too many for type checkers
 UNITS = ("pixels", "world")
@@ -32,21 +34,21 @@ def checked(**values: Any) -> dict[str, Any]:
 def _value(name: str, value: Any) -> Any:
     if name in _OWN:
         return _OWN[name](value, name)
-    parameter = _parameters()[name]
-    if parameter.kind == "Enum":
-        return _choice(value, name, parameter.choices)
-    if parameter.kind == "Boolean":
+    declared = _declared()[name]
+    if declared.choices:
+        return choice(value, name, declared.choices)
+    if declared.kind is bool:
         return _flag(value, name)
-    return _number(value, name, parameter.kind == "Int", _limits(parameter))
+    return _number(value, name, declared.kind is int, _limits(declared))
 
 
 @cache
-def _parameters() -> Mapping[str, Parameter]:
-    return {p.field: p for p in filters()["generate_quad_mesh_from_image"].parameters}
+def _declared() -> Mapping[str, Declaration]:
+    return declarations(SmoothingOptions) | declarations(MeshOptions)
 
 
-def _limits(parameter: Parameter) -> tuple[float, float] | None:
-    return None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
+def _limits(declared: Declaration) -> tuple[float, float] | None:
+    return None if declared.least is None or declared.most is None else (declared.least, declared.most)
 
 
 def _number(value: Any, name: str, whole: bool = False, limits: tuple[float, float] | None = None) -> Any:
@@ -73,14 +75,17 @@ def _flag(value: Any, name: str) -> bool:
     return bool(value)
 
 
-def _choice(value: Any, name: str, choices: Iterable[str]) -> str:
+def choice(value: Any, name: str, choices: Iterable[Any]) -> Any:
+    """Return a value that is one of the choices."""
+    if not isinstance(value, (str, int)) or isinstance(value, bool):  # an array is equal to none and many
+        raise TypeError(f"{name} must be one of {list(choices)}. Got {type(value)} instead.")
     _validation.check_contains(list(choices), must_contain=value, name=name)
-    return str(value)
+    return value
 
 
 def _limit_of_noise(value: Any, name: str) -> Any:
     if isinstance(value, str):
-        return _choice(value, name, ["auto"])
+        return choice(value, name, ["auto"])
     made = _number(value, name, whole=name == "min_pixels")
     _validation.check_nonnegative(made, name=name)
     return made
@@ -88,7 +93,7 @@ def _limit_of_noise(value: Any, name: str) -> Any:
 
 def _colors(value: Any, name: str) -> Any:
     if isinstance(value, str):
-        return _choice(value, name, ("auto", "exact"))
+        return choice(value, name, ("auto", "exact"))
     if isinstance(value, Iterable):
         palette = _validation.validate_array(
             value, must_have_shape=(-1, 3), must_be_in_range=(0, 255), must_be_finite=True, name=name
@@ -136,7 +141,6 @@ _OWN: Mapping[str, Callable[[Any, str], Any]] = {
     "drop": _materials,
     "materials": _materials,
     "sample": _names,
-    "in_twelves": _flag,
     "progress_bar": _flag,
-    "unit": lambda value, name: _choice(value, name, UNITS),
+    "unit": lambda value, name: choice(value, name, UNITS),
 }

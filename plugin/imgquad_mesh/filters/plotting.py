@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from imgquad_core.geometry.halfedge import twins_of
+import imgquad_core as core
 from imgquad_mesh.datasets.fields import materials_of
 from imgquad_mesh.datasets.grids import flattened, quads_of
 from imgquad_mesh.outputs.mesh_picture import material_colors
@@ -90,7 +90,7 @@ def _mark_irregular(plotter: Any, grid: pv.UnstructuredGrid | pv.PolyData) -> No
 def on_boundary(grid: pv.UnstructuredGrid | pv.PolyData) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Tell of each point whether it lies on the border or between two materials."""
     quads = quads_of(grid)
-    twins = twins_of(quads, grid.n_points)
+    twins = core.geometry.twins_of(quads, grid.n_points)
     material = np.asarray(grid.cell_data.get("material", np.zeros(len(quads), np.int32)))
     own = np.repeat(material, 4)
     bound = np.flatnonzero((twins < 0) | (own != material[np.maximum(twins, 0) // 4]))

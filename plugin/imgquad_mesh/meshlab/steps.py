@@ -10,13 +10,13 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.boundary.extraction import ExtractionOptions, extract_boundaries
-from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
-from imgquad_core.cleanup.optimization import OptimizationOptions, optimize
+from imgquad_core import MeshOptions, pipeline
+from imgquad_core.boundary import ExtractionOptions, SmoothingOptions
+from imgquad_core.cleanup import OptimizationOptions, optimize
+from imgquad_core.declared import option, same_as
 from imgquad_core.errors import InputError
-from imgquad_core.fe.elements import ElementOptions
-from imgquad_core.fe.sets import fe_mesh
-from imgquad_core.measures.quality import (
+from imgquad_core.fe import ElementOptions, fe_mesh
+from imgquad_core.measures import (
     aspect,
     corner_angles,
     material_areas,
@@ -24,16 +24,19 @@ from imgquad_core.measures.quality import (
     quality_report,
     scaled_jacobian,
 )
-from imgquad_core.mesher.efforts import MeshingOptions
-from imgquad_core.mesher.meshing import mesh_boundaries
-from imgquad_core.mesher.triangulation import triangulator_used
+from imgquad_core.mesher import MeshingOptions, triangulator_used
 from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
-from imgquad_core.options import MeshOptions
-from imgquad_core.picture.noise import DenoiseOptions, list_removed, remove_noise
-from imgquad_core.picture.reading import read_picture
-from imgquad_core.picture.segmentation import SegmentationOptions, segment_picture
-from imgquad_core.picture.selection import Box, crop_image, drop_materials, material_number
-from imgquad_core.pipeline import run
+from imgquad_core.picture import (
+    Box,
+    DenoiseOptions,
+    SegmentationOptions,
+    crop_image,
+    drop_materials,
+    list_removed,
+    remove_noise,
+    segment_picture,
+    sizes_by_number,
+)
 from imgquad_mesh.outputs.files import check_target, mesh_extensions, write_labels, write_mesh_file
 
 from .crosscheck import boundary_lengths, material_perimeters
@@ -46,21 +49,26 @@ from .state import State
 class CropOptions:
     """The part of a picture that stays: left, upper, right, lower bound in pixels, from the upper left corner."""
 
-    crop: Box | None = None
+    crop: Box | None = same_as(MeshOptions, "crop")
 
 
 @dataclass(frozen=True)
 class DropOptions:
     """Names or numbers of the materials that are left out."""
 
-    drop: tuple[str, ...] = ()
+    drop: tuple[str, ...] = same_as(MeshOptions, "drop")
 
 
 @dataclass(frozen=True)
 class QualityOptions:
     """Which measure each quad gets as its value."""
 
-    metric: str = "scaled Jacobian"
+    metric: str = option(
+        "scaled Jacobian",
+        "scaled Jacobian: least sine of the corner angles, 1 for a rectangle, 0 or less for an invalid quad. Angles in "
+        "degrees. aspect: longest by shortest edge. area: in the unit of the mesh, squared",
+        choices=("scaled Jacobian", "least angle", "largest angle", "aspect", "area"),
+    )
 
 
 @dataclass(frozen=True)
@@ -72,12 +80,17 @@ class NoOptions:
 class MeshFileOptions:
     """Where the mesh is written (the extension names the format), and of which elements: see `ElementOptions`."""
 
-    file_name: str = "mesh.vtu"
-    order: int = 1
-    nodes: int = 8
-    cohesive: str | tuple[tuple[str, str], ...] | None = None
-    extrude: float | None = None
-    layers: int = 1
+    file_name: str = option(
+        "mesh.vtu",
+        "a file in the script's folder or below. Its extension names the format: .vtu .vtk for ParaView and PyVista, "
+        ".inp for Abaqus and CalculiX, .msh for Gmsh, .bdf for Nastran, .e for Exodus, .obj .off .ply .stl for mesh "
+        "apps, .svg .dxf for drawings, and more",
+    )
+    order: int = same_as(ElementOptions, "order")
+    nodes: int = same_as(ElementOptions, "nodes")
+    cohesive: str | tuple[tuple[str, str], ...] | None = same_as(ElementOptions, "cohesive")
+    extrude: float | None = same_as(ElementOptions, "extrude")
+    layers: int = same_as(ElementOptions, "layers")
 
     def __post_init__(self) -> None:
         self.elements()  # checks the values
@@ -91,12 +104,15 @@ class MeshFileOptions:
 class LabelFileOptions:
     """Where the labelled picture is written."""
 
-    file_name: str = "labels.npy"
+    file_name: str = option(
+        "labels.npy",
+        "a file in the script's folder or below: .npy (int32 array, row 0 on top) or .png (palette picture)",
+    )
 
 
 def _segment(state: State, options: SegmentationOptions) -> dict[str, Any]:
     image = state.need_image()
-    found = segment_picture(read_picture(image) if isinstance(image, (str, Path)) else image, options)
+    found = segment_picture(pipeline.read_source(image), options)
     state.put_labels(found.image)
     return {"note": found.note, **_label_counts(found.image)}
 
@@ -143,12 +159,12 @@ def _drop(state: State, options: DropOptions) -> dict[str, Any]:
 
 
 def _extract(state: State, options: ExtractionOptions) -> dict[str, Any]:
-    state.pixel_boundary, state.boundary = extract_boundaries(_labels(state), options), None
+    state.pixel_boundary, state.boundary = pipeline.extract(_labels(state), options), None
     return _put_boundary(state, state.pixel_boundary, "pixel boundary")
 
 
 def _smooth(state: State, options: SmoothingOptions) -> dict[str, Any]:
-    state.boundary = smooth_boundaries(_pixel_boundary(state), _numbered(options, state))
+    state.boundary = pipeline.smooth(_pixel_boundary(state), _numbered(options, state))
     return _put_boundary(state, state.boundary, "smoothed boundary")
 
 
@@ -157,8 +173,7 @@ Sized = TypeVar("Sized", SmoothingOptions, MeshingOptions)
 
 def _numbered(options: Sized, state: State) -> Sized:
     """Return the options with materials by number, which scripts may call by name."""
-    materials = _labels(state).materials
-    sizes = {material_number(materials, name): size for name, size in (options.material_sizes or {}).items()}
+    sizes = sizes_by_number(_labels(state).materials, options.material_sizes or {})
     return replace(options, material_sizes=sizes or None)
 
 
@@ -176,13 +191,13 @@ def _mesh_boundary(state: State, options: MeshingOptions) -> dict[str, Any]:
         smoothing = SmoothingOptions(size=options.size, growth=options.growth, material_sizes=options.material_sizes)
         _smooth(state, smoothing)
     assert state.boundary is not None
-    mesh = mesh_boundaries(state.boundary, _numbered(options, state), _labels(state).materials)
+    _, mesh = pipeline.fill_boundaries(state.boundary, _numbered(options, state), _labels(state).materials)
     state.put_mesh(mesh)
     return _size_of(mesh) | {"triangulator": triangulator_used(options.triangulator)}
 
 
 def _mesh_image(state: State, options: MeshOptions) -> dict[str, Any]:
-    done = run(state.labels if state.labels is not None else state.need_image(), options)
+    done = pipeline.run(state.labels if state.labels is not None else state.need_image(), options)
     state.labels, state.pixel_boundary, state.boundary = done.labels, done.pixel_boundary, done.boundary
     state.put_mesh(done.mesh)
     return _size_of(done.mesh) | {"triangulator": triangulator_used(options.triangulator)}

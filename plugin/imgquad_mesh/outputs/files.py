@@ -76,7 +76,7 @@ def write_boundaries(run: Run, path: Path) -> None:
 
     graph = run.boundary
     materials = np.append(graph.region_label, np.int32(-1))[graph.chain_regions]  # region -1 takes the last one
-    points = graph.points * run.options.pixel_size
+    points = graph.points * run.square
     lines = chain_lines(points, graph.chain_offsets, graph.chain_points, materials, graph.point_kind)
     replace_file(path, lambda temporary: save_dataset(lines, temporary))
 

@@ -15,7 +15,7 @@ import numpy as np
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.measures.quality import bad_places, forced_quads, quality_report, scaled_jacobian
-from imgquad_core.mesher.triangulation import triangulator_used
+from imgquad_core.mesher import triangulator_used
 from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.pipeline import thin_features
 
@@ -30,7 +30,7 @@ def build_report(
     run: Run, image: Path, output: Path, seconds: Mapping[str, float], min_quality: float | None = None
 ) -> dict[str, Any]:
     """Return the report of `run` as nested dicts and lists of plain numbers and strings."""
-    ledger = material_ledger(run.picture, run.labels, run.boundary, run.mesh, run.options.pixel_size)
+    ledger = material_ledger(run.picture, run.labels, run.boundary, run.mesh, run.options.pixel_sides)
     rows, cols = run.labels.shape
     return {
         "input": str(image),

@@ -259,7 +259,7 @@ def test_a_material_and_the_boundary_have_sizes_of_their_own() -> None:
 @pytest.mark.parametrize("radius", [10.0, 31.5, 33.0, 35.2, 37.0, 60.0])
 def test_very_long_pieces_get_a_multiple_of_twelve_edges_if_asked(radius: float) -> None:
     labels = disc(radius, (64.2, 63.9), 128)
-    free, length = (interface(smoothed(labels, 3.0, in_twelves=asked))[1] for asked in (False, True))
+    free, length = (interface(smoothed(labels, 3.0, edge_multiple=asked))[1] for asked in (4, 12))
     if radius == 10.0:
         assert np.array_equal(free, length)
     else:

@@ -7,9 +7,10 @@ import threading
 import numpy as np
 import pytest
 
-from imgquad_core.cleanup.batches import Portions, in_batches
+from imgquad_core.cleanup.batches import in_batches
 from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
 from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
+from imgquad_core.cleanup.options import Portions
 from support.faces import areas, assert_valid_faces, quads_of, voronoi_graph
 
 SMALL = Portions(batch=150)

@@ -10,9 +10,9 @@ import pytest
 
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
-from imgquad_core.cleanup.batches import Portions
 from imgquad_core.cleanup.faces import INNER_VALENCE, FaceQuads
 from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
+from imgquad_core.cleanup.options import Portions
 from imgquad_core.cleanup.strips import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
 from imgquad_core.measures.quality import quality_report
 from imgquad_core.mesher.efforts import MeshingOptions, Tuning

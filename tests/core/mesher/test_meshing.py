@@ -11,7 +11,7 @@ import pytest
 
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
-from imgquad_core.cleanup.batches import Portions
+from imgquad_core.cleanup.options import Portions
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.measures.quality import quality_report
 from imgquad_core.mesher import levels, meshing, refits
@@ -179,7 +179,7 @@ def test_every_face_has_quads_however_bad_they_are(monkeypatch: pytest.MonkeyPat
 
 def test_very_wide_faces_are_split_in_nine_with_the_most_effort() -> None:
     image = label_image(disc(50, (110, 110), 220))
-    graph = boundaries(image, 2.0, in_twelves=True)
+    graph = boundaries(image, 2.0, edge_multiple=12)
     options = MeshingOptions(size=2.0, effort="best")
     nine = mesh_boundaries(graph, options, image.materials)
     assert_valid_mesh(nine, image)
@@ -401,7 +401,7 @@ def test_island_on_the_wrong_side_of_a_chord_is_kept_on_its_own() -> None:
         ({"material_sizes": {3: -1.0}}, "size of material 3 is -1.0"),
         ({"growth": 1.0}, "growth is 1.0; give a ratio from 1.01"),
         ({"effort": "most"}, "effort is 'most'; give one of fast, normal, best"),
-        ({"threads": 0}, "threads is 0; give at least 1"),
+        ({"threads": 0}, "threads is 0; give a whole number of at least 1"),
     ],
 )
 def test_bad_options_are_named_with_their_value_and_the_remedy(options: dict[str, Any], message: str) -> None:

@@ -144,7 +144,7 @@ def test_a_disk_that_fills_up_leaves_the_old_file_and_no_half_one(tmp_path: Path
     target.write_text("old")
     program = (
         "import resource, signal, sys\n"
-        "from handmade import disk, staircase\n"
+        "from support.handmade import disk, staircase\n"
         "from imgquad_core.errors import InputError\n"
         "from imgquad_core.writers import write_mesh\n"
         "mesh = staircase(disk(30, 9))\n"

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Literal, get_args
 
 import pytest
 
+from imgquad_core import MeshOptions
+from imgquad_core.boundary import ExtractionOptions, SmoothingOptions
+from imgquad_core.cleanup import OptimizationOptions
+from imgquad_core.declared import declarations
+from imgquad_core.mesher import MeshingOptions
+from imgquad_core.picture import SegmentationOptions
 from imgquad_mesh import filters
 from imgquad_mesh.spec import Parameter
 from imgquad_mesh.spec import filters as described
@@ -90,6 +97,65 @@ def test_every_parameter_of_filters_xml_is_a_parameter_here() -> None:
             assert fields <= set(inspect.signature(function).parameters), name
 
 
+#: filters of PyVista, and the options whose declarations they follow
+FOLLOWED: dict[Callable[..., Any], type] = {
+    filters.segment: SegmentationOptions,
+    filters.remove_noise: MeshOptions,
+    filters.boundaries: ExtractionOptions,
+    filters.smooth: SmoothingOptions,
+    filters.quads: MeshingOptions,
+    filters.mesh: MeshOptions,
+    filters.optimize: OptimizationOptions,
+}
+
+
+def drift(function: Callable[..., Any], options: type) -> list[str]:
+    """What signature and docstring of a filter say differently than the options that it makes."""
+    found = []
+    for name, parameter in inspect.signature(function).parameters.items():
+        declared = declarations(options).get(name)
+        if declared is None:
+            continue
+        none = parameter.default is None  # the filter has a default of its own, or says None for an empty mapping
+        if not none and parameter.default != declared.default:
+            found.append(f"{name} is {parameter.default!r}, not {declared.default!r}")
+        told = re.search(rf"^ +(?:\w+, )?{name}(?:, \w+)? : .*?(?:default: (.*))?$", function.__doc__ or "", re.M)
+        if told is None:
+            found.append(f"{name} is not in the docstring")
+        elif told[1] and told[1].strip('"') != str(declared.default):
+            found.append(f"{name} is {told[1]} in the docstring, not {declared.default!r}")
+        choices = get_args(eval(parameter.annotation, function.__globals__)) if declared.choices else ()
+        if choices != declared.choices:
+            found.append(f"{name} takes {choices}, not {declared.choices}")
+    return found
+
+
+@pytest.mark.parametrize(("function", "options"), FOLLOWED.items(), ids=lambda each: each.__name__)
+def test_signatures_say_what_the_options_declare(function: Callable[..., Any], options: type) -> None:
+    assert drift(function, options) == []
+
+
+def test_a_drift_is_found() -> None:
+    def filter_of_one(
+        size: float = 5.0, effort: Literal["fast", "best"] = "normal", growth: float = 1.3, max_shift: float = 1.0
+    ) -> None:
+        """Do something.
+
+        Parameters
+        ----------
+        size : float, default: 4.0
+        effort : "fast" | "best", default: "normal"
+        growth : float, default: 1.4
+        """
+
+    assert drift(filter_of_one, MeshOptions) == [
+        "size is 5.0, not 4.0",
+        "effort takes ('fast', 'best'), not ('fast', 'normal', 'best')",
+        "growth is 1.4 in the docstring, not 1.3",
+        "max_shift is not in the docstring",
+    ]
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -99,7 +165,7 @@ def test_every_parameter_of_filters_xml_is_a_parameter_here() -> None:
         (lambda: IMAGE.imgquad.mesh(progress_bar=1), "progress_bar must be an instance of <class 'bool'>."),
         (lambda: IMAGE.imgquad.mesh(size=0), "size values must all be greater than 0.0."),
         (lambda: IMAGE.imgquad.mesh(size=0.01), "size is 0.01; give a length of at least 0.05 px"),
-        (lambda: IMAGE.imgquad.mesh(threads=0), "threads is 0; give at least 1"),
+        (lambda: IMAGE.imgquad.mesh(threads=0), "threads is 0; give a whole number of at least 1"),
         (lambda: SMOOTH.imgquad.quads().imgquad.optimize(effort="x"), "effort 'x' is not valid."),
         (lambda: SMOOTH.imgquad.quads().imgquad.plot("area"), "scalars 'area' is not valid."),
         (lambda: IMAGE.imgquad.mesh("label", 3), "takes from 1 to 2 positional arguments but 3 were given"),

@@ -1,0 +1,5 @@
+from .halfedge import twins_of
+
+__all__ = [
+    "twins_of",
+]

@@ -1,0 +1,131 @@
+"""How pictures are read, segmented and freed of noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Integral
+from typing import Any
+
+from imgquad_core.declared import POLICY, Declaration, check, option
+from imgquad_core.errors import InputError
+
+_NUMBER = Declaration(0, "", int, least=1, most=256)  # of colours
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How a file is read.
+
+    Parameters
+    ----------
+    max_pixels : int
+        Larger pictures are refused before they are decoded (decompression bombs).
+    frame : int, optional
+        Which picture of a stack (TIFF pages, animation frames, first axis of a NPY array), counted from 0.
+    """
+
+    max_pixels: int = option(
+        100_000_000,
+        "larger pictures are refused before they are decoded",
+        what="a number of pixels",
+        least=1,
+        told="100 million",
+        topic="picture",
+    )
+    frame: int | None = option(
+        None, "which picture of a stack (pages of a TIFF, frames), counted from 0", kind=int, least=0, topic="picture"
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class SegmentationOptions:
+    """How colours become materials.
+
+    Parameters
+    ----------
+    colors : "auto", "exact", int or sequence of RGB
+        "exact": one material per distinct value or colour. A number: quantised to that many colours. A palette (RGB, 0
+        to 255): each pixel takes the nearest colour of it. "auto": exact where the picture has at most 32 colours or
+        holds labels, else quantised to a number that is chosen from the histogram.
+    drop_transparent : bool
+        Whether pixels of alpha 0 become `VOID`.
+    """
+
+    colors: str | int | Sequence[Sequence[int]] = option(
+        "auto",
+        "how colours become materials: each its own (exact), quantised to a number of them, the nearest colour of a "
+        "palette, or auto: exact up to 32 colours, else a number that the report states",
+        kind=object,
+        topic="picture",
+    )
+    drop_transparent: bool = option(
+        False, "leave out pixels of alpha 0: they are not meshed, and their boundary is free", topic="picture"
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        _check_colors(self.colors)
+
+
+def _check_colors(colors: Any) -> None:
+    if isinstance(colors, str):
+        if colors not in ("auto", "exact"):
+            raise InputError(f"colors is '{colors}': give auto, exact, a number of colours or a list of RGB")
+    elif isinstance(colors, Integral):
+        if not _NUMBER.allows(colors):
+            raise InputError(f"colors is {colors}: give a number of colours from 1 to 256")
+    elif not _is_palette(colors):
+        raise InputError(f"colors is {colors}: give a palette as rows of R, G, B from 0 to 255")
+
+
+def _is_palette(colors: Any) -> bool:
+    try:
+        rows = [[float(level) for level in color] for color in colors]
+    except (TypeError, ValueError):
+        return False
+    return bool(rows) and all(len(row) == 3 and all(0 <= level <= 255 for level in row) for row in rows)
+
+
+@dataclass(frozen=True)
+class DenoiseOptions:
+    """What counts as noise.
+
+    Parameters
+    ----------
+    min_pixels : int
+        Clusters of this many pixels or more stay. 0 or 1: nothing is removed.
+    min_length : float
+        Clusters of this characteristic length or more stay, in pixels. 0: nothing is removed.
+    policy : {"minority", "majority", "lower", "diagonal", "junction"}
+        What is connected over an ambiguous corner of four pixels: the same as in `ExtractionOptions`.
+    """
+
+    min_pixels: int = option(
+        0,
+        "clusters of this many pixels or more stay; 0: nothing is removed",
+        what="a whole number of pixels",
+        least=0,
+        topic="noise",
+    )
+    min_length: float = option(
+        0.0,
+        "clusters of this characteristic length (the longest way inside, also of bent ones) or more stay, in pixels; "
+        "0: nothing is removed",
+        what="a length",
+        least=0.0,
+        unit="px",
+        topic="noise",
+    )
+    policy: str = POLICY.field()
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @property
+    def removes(self) -> bool:
+        """Whether any cluster can be noise: a single pixel has the length 1."""
+        return self.min_pixels > 1 and self.min_length > 1
