@@ -85,7 +85,7 @@ def test_grids_take_all_elements(picture: Path) -> None:
         ("a.inp", ["--order", "2", "--extrude", "3"], "exclude each other"),
         ("a.inp", ["--order", "2", "--nodes", "9"], "no quad9 for the analysis"),
         ("a.inp", ["--cohesive", "quartz:sand"], "there is no material 'quartz'"),
-        ("a.inp", ["--extrude", "-2"], "thickness -2.0 must be positive"),
+        ("a.inp", ["--extrude", "-2"], "extrude is -2.0; give a length above 0"),
         ("a.inp", ["--order", "2", "--cohesive", "all"], "write springs (interfaces: springs) or no elements between"),
         ("a.msh", ["--order", "2", "--cohesive", "all"], "Gmsh has no six-node cohesive elements"),
         ("a.e", ["--order", "2", "--cohesive", "all"], "Exodus has no six-node cohesive elements"),
