@@ -1,4 +1,4 @@
-"""How good are solutions on our meshes? Prints the figures of docs/fe_figures.md; needs CalculiX and scikit-fem.
+"""How good are solutions on our meshes? Prints the figures of docs/fe/figures.md; needs CalculiX and scikit-fem.
 
 python benchmarks/fe_figures.py patch ../shared/images     patch tests on the clean label pictures
 python benchmarks/fe_figures.py bounds                     effective modulus: bounds and order of convergence
