@@ -1,8 +1,8 @@
 """Step 3 of the paper: smooth boundaries, cut into edges of the wanted length.
 
 In this order: junctions and border ends move (`junctions`), local polynomials smooth the chains (`fitting`), every
-point within a bound that keeps foreign boundaries apart; then edge lengths are wanted everywhere (`spacing`), nodes
-placed (`placement`), tested exactly (`clearance`), drawn back where they fail (`resolving`), and the regions get back
+point within a bound that keeps foreign boundaries apart; then edge lengths are wanted everywhere (`edge_sizes`), nodes
+placed (`nodes`), tested exactly (`geometry.conflicts`), drawn back where they fail (`withdrawal`); the regions get back
 their areas (`areas`).
 """
 

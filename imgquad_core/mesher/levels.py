@@ -77,7 +77,7 @@ def consistent(graph: BoundaryGraph, new: Flags, triangulator: str) -> BoundaryG
 
 
 def mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> Meshed:
-    """Mesh flagged faces on their levels."""
+    """Mesh flagged faces, each on its stride."""
     effort = EFFORTS[options.effort]
     best = Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -np.inf))
     if effort.in_nine:

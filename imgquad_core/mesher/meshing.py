@@ -1,6 +1,6 @@
-"""From boundaries to quads: the paper's step 4, face by face on levels.
+"""From boundaries to quads: the paper's step 4, face by face on strides.
 
-Every face (region) is meshed alone; faces meet in the points of the boundary, so they fit whatever their level. A
+Every face (region) is meshed alone; faces meet in the points of the boundary, so they fit whatever their stride. A
 wide face is meshed and cleaned up with a stride of four final edges (an irregular node stays one node while nodes
 become sixteen times as many), with effort "best" a very wide one with a stride of six, others with one of two. A face
 whose worst element is poor is meshed again with the next smaller stride, and the better mesh is kept.

@@ -1,4 +1,4 @@
-"""The bridge to pymeshlab: meshes into a ``MeshSet`` and out of it, exactly, and our filters as its methods."""
+"""The bridge to pymeshlab: meshes into a ``MeshSet`` and out of it, exactly (our filters as its methods: `methods`)."""
 
 from __future__ import annotations
 
