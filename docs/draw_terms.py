@@ -254,7 +254,7 @@ def around(made: Run) -> tuple[int, Any]:
     """Return an irregular node inside, and the quads at it."""
     mesh = made.mesh
     odd = np.flatnonzero(inner_nodes(mesh) & (mesh.valence != 4))
-    v = int(odd[np.hypot(*(mesh.points[odd] - [34, 33]).T).argmin()])
+    v = int(odd[np.hypot(*(mesh.points[odd] - [50, 9]).T).argmin()])
     return v, (mesh.quads == v).any(axis=1)
 
 
@@ -262,6 +262,7 @@ def draw_ring(panel: Any, made: Run) -> None:
     mesh, (v, ring) = made.mesh, around(made)
     quads(panel, mesh.points, mesh.quads)
     quads(panel, mesh.points, mesh.quads[ring], "#f4b6b6")
+    chains(panel, made.boundary, "black", 2)
     dots(panel, mesh.points[v])
     zoom(panel, *mesh.points[v], 24)
 
@@ -272,6 +273,7 @@ def draw_cavity(panel: Any, made: Run) -> None:
     cavity = np.isin(mesh.quads, mesh.quads[ring]).any(axis=1) & same
     quads(panel, mesh.points, mesh.quads)
     quads(panel, mesh.points, mesh.quads[cavity], "#f4b6b6")
+    chains(panel, made.boundary, "black", 2)
     dots(panel, mesh.points[v])
     zoom(panel, *mesh.points[v], 24)
 
