@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -19,12 +20,13 @@ from support.labels import KINDS, Labels, label_image, labels_of_kind, spiral, v
 
 SIZES = (1.0, 2.5, 6.0)
 N_COLORS = 8
+TRIANGULATORS = ["cdt", *(["triangle"] if find_spec("triangle") else [])]
 bounded = settings(derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
 
 
-def valid_mesh(image: LabelImage, size: float, effort: str = "normal") -> QuadMesh:
+def valid_mesh(image: LabelImage, size: float, effort: str = "normal", triangulator: str = "auto") -> QuadMesh:
     graph = smooth_boundaries(extract_boundaries(image), SmoothingOptions(size=size))
-    mesh = mesh_boundaries(graph, MeshingOptions(size=size, effort=effort), image.materials)
+    mesh = mesh_boundaries(graph, MeshingOptions(size=size, effort=effort, triangulator=triangulator), image.materials)
     assert_valid_mesh(mesh, image)
     return mesh
 
@@ -48,15 +50,15 @@ def small_pictures(draw: st.DrawFn) -> Labels:
 
 
 @settings(bounded, max_examples=70)
-@given(pictures(), st.sampled_from(SIZES), st.sampled_from(sorted(EFFORTS)))
-def test_any_picture_becomes_a_valid_mesh(labels: Labels, size: float, effort: str) -> None:
-    valid_mesh(label_image(labels), size, effort)
+@given(pictures(), st.sampled_from(SIZES), st.sampled_from(sorted(EFFORTS)), st.sampled_from(TRIANGULATORS))
+def test_any_picture_becomes_a_valid_mesh(labels: Labels, size: float, effort: str, triangulator: str) -> None:
+    valid_mesh(label_image(labels), size, effort, triangulator)
 
 
 @settings(bounded, max_examples=60)
-@given(small_pictures(), st.sampled_from(SIZES))
-def test_any_few_pixels_become_a_valid_mesh(labels: Labels, size: float) -> None:
-    valid_mesh(label_image(labels), size)
+@given(small_pictures(), st.sampled_from(SIZES), st.sampled_from(TRIANGULATORS))
+def test_any_few_pixels_become_a_valid_mesh(labels: Labels, size: float, triangulator: str) -> None:
+    valid_mesh(label_image(labels), size, triangulator=triangulator)
 
 
 @settings(bounded, max_examples=25)
@@ -75,6 +77,7 @@ def test_turned_mirrored_and_recoloured_pictures_do_too(
     valid_mesh(label_image(turned), size)
 
 
+@pytest.mark.parametrize("triangulator", TRIANGULATORS)
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize(
     "labels",
@@ -92,8 +95,8 @@ def test_turned_mirrored_and_recoloured_pictures_do_too(
     ],
     ids=["pixel", "2x2", "row", "column", "checkerboard", "hooks", "dot", "dot in a corner", "hole", "spiral"],
 )
-def test_extremes(labels: Any, size: float) -> None:
-    valid_mesh(label_image(labels), size)
+def test_extremes(labels: Any, size: float, triangulator: str) -> None:
+    valid_mesh(label_image(labels), size, triangulator=triangulator)
 
 
 def test_recolouring_changes_the_materials_and_nothing_else() -> None:

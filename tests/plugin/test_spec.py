@@ -9,6 +9,7 @@ import subprocess
 import sys
 import zipfile
 from dataclasses import MISSING, dataclass, field, fields, make_dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -207,7 +208,7 @@ def test_limits_and_choices_are_those_of_the_options(function: str) -> None:
     spec, options = filters()[function], STEPS[function].options
     for p in spec.parameters:
         for value in (*p.choices, p.low, p.high):
-            if value is not None:
+            if value is not None and (value != "triangle" or find_spec("triangle")):
                 options_from(options, spec, {p.field: value})
         for beyond in [p.low - 1e-6, p.high + 1e-6] if p.low is not None and p.high is not None else []:
             with pytest.raises(InputError):
