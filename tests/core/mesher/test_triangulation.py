@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 
@@ -12,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError, TopologyError
-from imgquad_core.mesher import triangulation
+from imgquad_core.mesher import triangulators
 from imgquad_core.mesher.triangulation import Triangles, constraint_table, triangulate, triangulator_used
 from support import ROOT, naive
 from support.faces import areas, polygon_graph, voronoi_graph
@@ -194,10 +195,10 @@ def test_collinear_constraints_and_a_grid_full_of_ties_are_no_trouble(by: str) -
 @pytest.fixture
 def forgotten() -> Iterator[Callable[[str], None]]:
     """Make packages look missing."""
-    triangulation._is_installed.cache_clear()
+    triangulators._is_installed.cache_clear()
     with pytest.MonkeyPatch.context() as patch:
         yield lambda package: patch.setitem(sys.modules, package, None)
-    triangulation._is_installed.cache_clear()
+    triangulators._is_installed.cache_clear()
 
 
 @needs_triangle
@@ -226,6 +227,15 @@ def test_without_either_the_error_names_both(forgotten: Callable[[str], None]) -
 def test_other_names_are_refused() -> None:
     with pytest.raises(InputError, match="triangulator is 'netgen'; give one of auto, triangle, cdt"):
         triangulator_used("netgen")
+
+
+def test_an_installation_brings_triangle_only_where_it_is_asked_for() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    with_it = {name for name, wanted in extras.items() if any(w.startswith("triangle") for w in wanted)}
+    assert with_it == {"triangle", "dev"}
+    assert not any("triangle" in wanted for wanted in [*project["dependencies"], *extras["all"]])
+    assert any(wanted.startswith("pythoncdt") for wanted in project["dependencies"])
 
 
 @both
