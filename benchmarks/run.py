@@ -2,7 +2,7 @@
 
     python benchmarks/run.py                      quality, wedges, speed, growth, cold: about 10 minutes
     python benchmarks/run.py speed cold           some parts; the others' tables stay as they are
-    python benchmarks/run.py all                  all: pictures and noise take about 15 and 10 minutes more
+    python benchmarks/run.py all                  all: pictures, noise and triangulators take 15, 10 and 2 minutes more
     python benchmarks/run.py --out docs/benchmarks.md
 
 Each part prints its section and, with --out, replaces what stands between its two marks in that page. The machine
@@ -27,6 +27,7 @@ import noise
 import quality
 import real_pictures
 import speed
+import triangulators
 import wedges
 from imgquad_mesh.outputs.report import versions
 
@@ -34,6 +35,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "quality": quality.section,
     "wedges": wedges.section,
     "speed": speed.section,
+    "triangulators": triangulators.section,
     "growth": growth.section,
     "cold": cold_start.section,
     "pictures": real_pictures.section,
