@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import netcdf_file
+from scipy.io import netcdf_file, netcdf_variable
 
 from imgquad_core.arrays import Ints
 from imgquad_core.fe.femesh import FEMesh
@@ -119,6 +119,12 @@ def _put_names(file: Any, name: str, dimension: str, texts: list[str]) -> None:
 
 
 def _put(file: Any, name: str, kind: str, dimensions: tuple[str, ...], values: NDArray[Any]) -> Any:
-    variable = file.createVariable(name, kind, dimensions)
-    variable[:] = values
+    """Add a variable; all come into the file in the order in which they are added.
+
+    SciPy writes them by falling shape, so all claim the same one (it is used for nothing else). meshio pairs the n-th
+    set in the file with the n-th name.
+    """
+    data = np.ascontiguousarray(values, np.dtype(kind).newbyteorder(">"))
+    variable = netcdf_variable(data, kind, data.itemsize, (1,), dimensions)
+    file.variables[name] = variable
     return variable

@@ -1,6 +1,8 @@
 """Gmsh mesh files (text, 4.1 and 2.2) with named physical groups.
 
 Each group is one entity whose tag is the group's: GetFEM reads entities for groups, getdp numbers over all dimensions.
+Node tags ascend through the file: OpenFOAM's gmshToFoam takes the n-th node for the one of the n-th smallest tag. Names come in the order
+sides, elements, points: ElmerGrid takes the dimension of the mesh for one less at each name of lower dimension.
 """
 
 from __future__ import annotations
@@ -105,8 +107,10 @@ def _point_groups(mesh: FEMesh) -> Iterator[tuple[int, str, str, Ints]]:
 
 
 def _names_text(groups: list[Group]) -> Iterator[str]:
+    highest = max(g.dimension for g in groups)
+    ordered = sorted(groups, key=lambda g: (g.dimension < highest - 1, g.dimension))
     yield f"$PhysicalNames\n{len(groups)}\n"
-    yield from (f'{g.dimension} {g.tag} "{g.name}"\n' for g in groups)
+    yield from (f'{g.dimension} {g.tag} "{g.name}"\n' for g in ordered)
     yield "$EndPhysicalNames\n"
 
 
@@ -139,14 +143,14 @@ def _entities(points: Floats, groups: list[Group]) -> Iterator[str]:
 
 
 def _node_blocks(points: Floats, groups: list[Group]) -> list[tuple[Group, Ints]]:
-    """Each node in the first group of the lowest dimension that has it."""
+    """Runs of nodes in the order of their numbers; each in the first group of the lowest dimension that has it."""
     owner = np.full(len(points), -1)
     ordered = sorted(groups, key=lambda g: -g.dimension)
     for i, g in reversed(list(enumerate(ordered))):
-        nodes = g.nodes[owner[g.nodes] < 0]
-        owner[nodes] = i
-    blocks = [(g, np.flatnonzero(owner == i)) for i, g in enumerate(ordered)]
-    return [(g, ids) for g, ids in blocks if len(ids)]
+        owner[g.nodes[owner[g.nodes] < 0]] = i
+    starts = np.flatnonzero(np.diff(owner, prepend=-2))
+    ends = np.append(starts[1:], len(owner))
+    return [(ordered[owner[a]], np.arange(a, b)) for a, b in zip(starts, ends, strict=True)]
 
 
 def _text_22(points: Floats, groups: list[Group]) -> Iterator[str]:

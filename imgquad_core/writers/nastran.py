@@ -84,9 +84,12 @@ def _text(mesh: FEMesh, element: str, thickness: float, values: Properties) -> I
 
 
 def _card(element: str, pid: int, n_nodes: int) -> str:
-    """Small-field template of an element: 8 columns a field, 6 nodes on the first line."""
+    """Small-field template of an element: 8 columns a field, 6 nodes on the first line.
+
+    The second line starts with ``+``: meshio takes one that starts with blanks for the end of the file's element.
+    """
     first = f"{element:8s}%8d{pid:8d}" + "%8d" * min(n_nodes, 6)
-    return first + ("\n        " + "%8d" * (n_nodes - 6) if n_nodes > 6 else "") + "\n"
+    return first + ("\n+       " + "%8d" * (n_nodes - 6) if n_nodes > 6 else "") + "\n"
 
 
 def _fields(points: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.str_]]:
