@@ -30,7 +30,7 @@ def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all
     mesh : FEMesh
         Plane, of quads with 4, 8 or 9 nodes, not split before.
     pairs : ``all`` or pairs of material names
-        Between which materials.
+        Between which materials. A name twice: between all elements of this material.
 
     Returns
     -------
@@ -93,8 +93,6 @@ def _chosen(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]]) -> list[tuple[
         for name in pair:
             if name not in numbers:
                 raise InputError(f"cohesive: there is no material '{name}'; there are: {', '.join(numbers)}")
-        if len({*pair}) != 2:
-            raise InputError(f"cohesive: {pair!r} must be two materials")
         chosen.add((min(numbers[n] for n in pair), max(numbers[n] for n in pair)))
     if not chosen:
         raise InputError("cohesive: no pair of materials was given")
@@ -102,15 +100,21 @@ def _chosen(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]]) -> list[tuple[
 
 
 def _cut_half_edges(mesh: FEMesh, chosen: list[tuple[int, int]]) -> tuple[Ints, Ints]:
-    """Half-edges of chosen interfaces: of the material of lower number, ascending, and their twins."""
+    """Half-edges of chosen interfaces: of the material (the element) of lower number, ascending, and their twins."""
     twin = half_edge_twins(mesh.cells[:, :4], mesh.n_points)
     own, other = mesh.cell_material[np.arange(len(twin)) // 4], mesh.cell_material[twin // 4]
-    lower = np.flatnonzero((twin >= 0) & (own < other))
+    is_inside = any(a == b for a, b in chosen)
+    first = (own < other) | ((own == other) & (np.arange(len(twin)) < twin) & is_inside)
+    lower = np.flatnonzero((twin >= 0) & first)
     if chosen:
         names = mesh.material_names()
         is_chosen = np.zeros(len(lower), bool)
         for a, b in chosen:
             of_pair = (own[lower] == a) & (other[lower] == b)
+            if not of_pair.any() and a == b:
+                raise InputError(
+                    f"cohesive: {(names[a], names[b])!r} must be two materials, or one with two elements side by side"
+                )
             if not of_pair.any():
                 raise InputError(f"cohesive: '{names[a]}' and '{names[b]}' do not touch; leave this pair out")
             is_chosen |= of_pair

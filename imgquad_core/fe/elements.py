@@ -35,6 +35,10 @@ class ElementOptions:
         ``x``, ``y`` or ``xy``: tie the nodes of opposite sides, of a mesh made with the same option.
     open_interfaces : bool
         Leave the split interfaces open: no cohesive elements between their two sides.
+    split_quads : bool
+        Cut each quad into two triangles.
+    mark_interfaces : bool
+        Name the sides between two materials, too; without them all named sides are boundary.
     """
 
     order: int = option(
@@ -55,18 +59,23 @@ class ElementOptions:
     layers: int = option(1, "number of hexes over the thickness", least=1, topic="elements")
     periodic: str | None = None
     open_interfaces: bool = False
+    split_quads: bool = False
+    mark_interfaces: bool = True
 
     def __post_init__(self) -> None:
         check(self)
         if self.order == 2 and self.extrude is not None:
             raise InputError("order 2 and extrusion exclude each other: hexes have 8 nodes")
+        if self.split_quads and (self.order == 2 or self.extrude is not None):
+            raise InputError("splitting quads and order 2 or extrusion exclude each other: triangles have 3 nodes")
         if self.open_interfaces and self.cohesive is None:
             raise InputError("interfaces: sides is of split interfaces only; say which, with cohesive")
 
     @property
     def plain(self) -> bool:
-        """Whether these are just the quads of the mesh."""
-        return (self.order, self.cohesive, self.extrude, self.periodic) == (1, None, None, None)
+        """Whether these are just the quads of the mesh, with all sets."""
+        changed = (self.cohesive, self.extrude, self.periodic) != (None, None, None)
+        return self.order == 1 and self.mark_interfaces and not self.split_quads and not changed
 
 
 def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
@@ -75,7 +84,8 @@ def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
     from .extrusion import extrude
     from .periodic_pairs import with_periodic_pairs
     from .second_order import second_order
-    from .sets import fe_mesh
+    from .sets import fe_mesh, without_interfaces
+    from .triangles import split_quads
 
     elements = fe_mesh(mesh)
     if options.order == 2:
@@ -86,4 +96,8 @@ def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
         elements = with_periodic_pairs(elements, options.periodic)
     if options.extrude is not None:
         elements = extrude(elements, options.extrude, options.layers)
-    return open_interfaces(elements) if options.open_interfaces else elements
+    if options.split_quads:
+        elements = split_quads(elements)
+    if options.open_interfaces:
+        elements = open_interfaces(elements)
+    return elements if options.mark_interfaces else without_interfaces(elements)

@@ -70,6 +70,7 @@ def extrude(mesh: FEMesh, thickness: float, layers: int = 1) -> FEMesh:
         cohesive=_cohesive(mesh, layers),
         cohesive_pair=np.tile(mesh.cohesive_pair, (layers, 1)),
         periodic={name: _stacked(pairs, n, layers + 1) for name, pairs in mesh.periodic.items()},
+        element_sets={name: _stacked(ids, mesh.n_cells, layers) for name, ids in mesh.element_sets.items()},
     )
 
 

@@ -29,6 +29,7 @@ class Kind(NamedTuple):
 #                   0---4---1
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
+        "tri3": Kind(2, 3, ((0, 1), (1, 2), (2, 0))),
         "quad4": Kind(2, 4, ((0, 1), (1, 2), (2, 3), (3, 0))),
         "quad8": Kind(2, 8, ((0, 1, 4), (1, 2, 5), (2, 3, 6), (3, 0, 7))),
         "quad9": Kind(2, 9, ((0, 1, 4), (1, 2, 5), (2, 3, 6), (3, 0, 7))),
@@ -79,6 +80,8 @@ class FEMesh:
         Material below and above each of them; the normal points from the first to the second.
     periodic : mapping of str to int64 array, shape (n, 2)
         Pairs of nodes (master, slave) that a periodic cell ties, by direction `x`, `y`.
+    element_sets : mapping of str to int64 array
+        Ids of solid elements, ascending; sets besides those of materials and regions.
     """
 
     points: Floats
@@ -95,6 +98,7 @@ class FEMesh:
     cohesive: Ints = field(default_factory=lambda: np.empty((0, 4), np.int64))
     cohesive_pair: Labels = field(default_factory=lambda: np.empty((0, 2), np.int32))
     periodic: Mapping[str, Ints] = field(default_factory=dict)
+    element_sets: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, dtype in (
@@ -109,7 +113,7 @@ class FEMesh:
             ("cohesive_pair", np.int32),
         ):
             object.__setattr__(self, name, _frozen(getattr(self, name), dtype))
-        for name in ("node_sets", "side_sets", "periodic"):
+        for name in ("node_sets", "side_sets", "periodic", "element_sets"):
             object.__setattr__(self, name, _frozen_sets(getattr(self, name)))
 
     @property

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
 
 from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
@@ -41,6 +43,9 @@ def fe_mesh(mesh: QuadMesh) -> FEMesh:
         junctions            where three or more boundaries meet
         ==================== ======================================== ==========================================
 
+        Sets of elements are `at_interface_A_B`, of A and B with a node on their interface, and `at_interfaces`, with
+        one on any.
+
     Raises
     ------
     InputError
@@ -73,7 +78,22 @@ def fe_mesh(mesh: QuadMesh) -> FEMesh:
         point_kind=mesh.point_kind,
         chain_offsets=mesh.chain_offsets,
         chain_points=mesh.chain_points,
+        element_sets=_at_interfaces(mesh, names),
     )
+
+
+def without_interfaces(mesh: FEMesh) -> FEMesh:
+    """Return `mesh` without the sides that two elements share: its side sets are the boundary, and no more.
+
+    For programs that take every named side for a piece of the boundary. Node sets and sides of split interfaces stay.
+    """
+    sides = np.concatenate([np.empty((0, 2), np.int64), *mesh.side_sets.values()])
+    corners = 2 if mesh.dimension == 2 else 4
+    nodes = np.sort(mesh.side_nodes(sides)[:, :corners], axis=1)
+    _, of, times = np.unique(nodes, axis=0, return_inverse=True, return_counts=True)
+    is_outer = np.split(times[of.ravel()] == 1, np.cumsum([len(s) for s in mesh.side_sets.values()])[:-1])
+    outer = {name: s[kept] for (name, s), kept in zip(mesh.side_sets.items(), is_outer, strict=False) if kept.any()}
+    return replace(mesh, side_sets=outer)
 
 
 def _ends(mesh: QuadMesh, half_edges: Ints) -> Ints:
@@ -134,3 +154,32 @@ def _corner_sets(mesh: QuadMesh, node_sets: dict[str, Ints]) -> dict[str, Ints]:
         if len(both):
             corners[f"corner_{corner}"] = both
     return corners
+
+
+def _at_interfaces(mesh: QuadMesh, names: dict[int, str]) -> dict[str, Ints]:
+    """Elements with a node on an interface: of each two materials, and of all."""
+    twin = half_edge_twins(mesh.quads, mesh.n_points)
+    inner = np.flatnonzero(twin >= 0)
+    own, other = mesh.quad_material[inner // 4], mesh.quad_material[twin[inner] // 4]
+    lower = inner[own < other]
+    if not len(lower):
+        return {}
+    pairs, of = np.unique(np.stack([own, other], axis=1)[own < other], axis=0, return_inverse=True)
+    cell, pair = _touching(mesh, _ends(mesh, lower), of.ravel(), len(pairs))
+    between = (mesh.quad_material[cell][:, None] == pairs[pair]).any(axis=1)
+    claimed = Names(names.values())
+    sets = {claimed.claim("at_interfaces"): np.unique(cell)}
+    order = np.lexsort((cell[between], pair[between]))
+    ends = np.cumsum(np.bincount(pair[between], minlength=len(pairs)))
+    for (a, b), cells in zip(pairs.tolist(), np.split(cell[between][order], ends[:-1]), strict=True):
+        sets[claimed.claim(f"at_interface_{names[a]}_{names[b]}")] = cells
+    return sets
+
+
+def _touching(mesh: QuadMesh, ends: Ints, pair: Ints, n_pairs: int) -> tuple[Ints, Ints]:
+    """(element, pair) for each element and pair of materials that have a node in common, each once."""
+    on = coo_array((np.ones(2 * len(pair)), (ends.ravel(), np.repeat(pair, 2))), shape=(mesh.n_points, n_pairs))
+    corners = np.repeat(np.arange(mesh.n_quads), 4)
+    of = coo_array((np.ones(len(corners)), (corners, mesh.quads.ravel())), shape=(mesh.n_quads, mesh.n_points))
+    cell, pairs = (of.tocsr() @ on.tocsr()).nonzero()
+    return cell.astype(np.int64), pairs.astype(np.int64)

@@ -34,7 +34,7 @@ def write_npz(mesh: FEMesh, path: str | Path) -> None:
     for group, sets in (
         ("node_sets", mesh.node_sets),
         ("side_sets", mesh.side_sets),
-        ("element_sets", mesh.material_cells()),
+        ("element_sets", {**mesh.material_cells(), **mesh.element_sets}),
         ("periodic", mesh.periodic),
     ):
         arrays |= {f"{group}/{name.replace('/', '_')}": ids for name, ids in sets.items()}

@@ -16,7 +16,7 @@ from .gmsh import gmsh_text
 
 OVERHEAD = 200_000  #: bytes of an HDF5 file besides the arrays, at most
 MED_NAME_LIMIT = 80  #: Gmsh cuts longer ones off
-MESHIO_KINDS = {"quad4": "quad", "quad8": "quad8", "quad9": "quad9", "hex8": "hexahedron"}
+MESHIO_KINDS = {"tri3": "triangle", "quad4": "quad", "quad8": "quad8", "quad9": "quad9", "hex8": "hexahedron"}
 
 
 def write_med(mesh: FEMesh, path: str | Path) -> None:

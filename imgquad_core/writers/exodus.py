@@ -15,7 +15,7 @@ from imgquad_core.fe.femesh import FEMesh
 from .common import refuse_six_nodes, replacing, safe_names
 
 NAME_LIMIT = 255
-ELEMENTS = {"quad4": "QUAD4", "quad8": "QUAD8", "quad9": "QUAD9", "hex8": "HEX8"}
+ELEMENTS = {"tri3": "TRI3", "quad4": "QUAD4", "quad8": "QUAD8", "quad9": "QUAD9", "hex8": "HEX8"}
 
 
 def write_exodus(mesh: FEMesh, path: str | Path) -> None:

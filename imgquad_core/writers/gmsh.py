@@ -20,7 +20,7 @@ from imgquad_core.fe.femesh import FEMesh
 from .common import points_3d, refuse_six_nodes, rows, safe_names, write_text
 
 NAME_LIMIT = 127
-ELEMENT_TYPES = {"point": 15, "line2": 1, "line3": 8, "quad4": 3, "quad8": 16, "quad9": 10, "hex8": 5}
+ELEMENT_TYPES = {"point": 15, "tri3": 2, "line2": 1, "line3": 8, "quad4": 3, "quad8": 16, "quad9": 10, "hex8": 5}
 
 
 class Group(NamedTuple):

@@ -17,8 +17,8 @@ from .common import points_3d, refuse_cohesive, rows, safe_names, write_text
 
 NAME_LIMIT = 60  # names stand in comments; a line has 80 columns
 ELEMENTS: Mapping[str, Mapping[str, str]] = {
-    "plane stress": {"quad4": "CQUAD4", "quad8": "CQUAD8"},
-    "plane strain": {"quad4": "CPLSTN4", "quad8": "CPLSTN8"},
+    "plane stress": {"tri3": "CTRIA3", "quad4": "CQUAD4", "quad8": "CQUAD8"},
+    "plane strain": {"tri3": "CPLSTN3", "quad4": "CPLSTN4", "quad8": "CPLSTN8"},
     "solid": {"hex8": "CHEXA"},
 }
 
@@ -65,11 +65,11 @@ def write_nastran(
 
 
 def _text(mesh: FEMesh, element: str, thickness: float, values: Properties) -> Iterator[str]:
-    sets = {**mesh.node_sets, **mesh.material_cells()}
-    labels = safe_names(sets, NAME_LIMIT)
+    sets = [("nodes", mesh.node_sets), ("elements", mesh.material_cells()), ("elements", mesh.element_sets)]
+    labels = safe_names(dict.fromkeys(name for _, named in sets for name in named), NAME_LIMIT)
     yield "$ imgquad-mesh\nSOL 101\nCEND\n"
-    for number, (name, ids) in enumerate(sets.items(), 1):
-        yield f"$ SET {number}: {'nodes' if name in mesh.node_sets else 'elements'} {labels[name]}\n"
+    for number, (what, name, ids) in enumerate(((what, *item) for what, named in sets for item in named.items()), 1):
+        yield f"$ SET {number}: {what} {labels[name]}\n"
         yield from _case_set(number, ids + 1)
     yield "BEGIN BULK\n"
     points = points_3d(mesh)
@@ -108,7 +108,7 @@ def _real(value: float) -> str:
 
 
 def _property(element: str, pid: int, thickness: float, values: Mapping[str, float]) -> Iterator[str]:
-    if element.startswith("CQUAD"):
+    if element.startswith(("CQUAD", "CTRIA")):
         yield f"PSHELL* {pid:16d}{pid:16d}{_real(thickness):>16s}\n*\n"
     elif element.startswith("CPLSTN"):
         yield f"PPLANE* {pid:16d}{pid:16d}{_real(thickness):>16s}\n*\n"

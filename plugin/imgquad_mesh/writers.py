@@ -24,7 +24,8 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
         File to write; replaced only when all of it was written.
     **options
         Of the writer in `imgquad_core.writers`; and before it ``order=2`` (and ``nodes=9``), ``cohesive="all"`` or
-        pairs of names (``interfaces="sides"`` for no elements between), ``extrude=thickness`` and ``layers=n``.
+        pairs of names (``interfaces="sides"`` for no elements between), ``extrude=thickness`` and ``layers=n``,
+        ``split_quads=True`` for triangles; ``interfaces="none"`` leaves out the sides that two materials share.
 
     Raises
     ------
@@ -38,9 +39,8 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
     from imgquad_core.fe.elements import ElementOptions, make_elements
     from imgquad_core.writers import write_mesh
 
-    names = [name for name in ("order", "nodes", "cohesive", "extrude", "layers", "periodic") if name in options]
-    sides = options.get("interfaces") == "sides"
-    if sides:
-        del options["interfaces"]
-    elements = ElementOptions(**{name: options.pop(name) for name in names}, open_interfaces=sides)
+    known = ("order", "nodes", "cohesive", "extrude", "layers", "periodic", "split_quads")
+    chosen = {name: options.pop(name) for name in known if name in options}
+    between = options.pop("interfaces") if options.get("interfaces") in ("sides", "none") else None
+    elements = ElementOptions(**chosen, open_interfaces=between == "sides", mark_interfaces=between != "none")
     write_mesh(make_elements(from_grid(dataset), elements), path, **options)

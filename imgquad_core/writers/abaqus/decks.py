@@ -42,8 +42,9 @@ def deck_text(
         A material has no values or a border is not there.
     """
     for name in mesh.material_names().values():
-        missing = [key for key in DECKS[deck] if key not in values_of(values, name)]
-        if missing:
+        given = values_of(values, name)
+        missing = [key for key in DECKS[deck] if key not in given]
+        if missing and not {"user_material", "abaqus"} & set(given):
             raise InputError(
                 f"the deck '{deck}' needs {' and '.join(missing)} of material '{name}'; "
                 f'give them in a TOML file of properties below ["{name}"] or ["*"]'

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 FLAT = 1e-6  #: largest distance from the plane, relative to the extent
 #: VTK cell of each element kind
 CELLS = {
+    "tri3": pv.CellType.TRIANGLE,
     "quad4": pv.CellType.QUAD,
     "quad8": pv.CellType.QUADRATIC_QUAD,
     "quad9": pv.CellType.BIQUADRATIC_QUAD,

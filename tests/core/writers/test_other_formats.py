@@ -157,7 +157,7 @@ def test_a_disk_that_fills_up_leaves_the_old_file_and_no_half_one(tmp_path: Path
         [sys.executable, "-c", program, str(target)],
         capture_output=True,
         text=True,
-        env={"PYTHONPATH": ":".join(sys.path)},
+        env={"PYTHONPATH": ":".join(sys.path), "PYTHONDONTWRITEBYTECODE": "1"},  # else Python leaves truncated .pyc
     )
     assert f"cannot write {target}: " in run.stdout, run.stderr
     assert (run.returncode, run.stderr) == (0, "")
