@@ -50,7 +50,8 @@ class ElementOptions:
     nodes: int = option(8, "nodes of a quad of order 2", choices=(8, 9), topic="elements")
     cohesive: str | Iterable[tuple[str, str]] | None = option(
         None,
-        "pairs of materials between which interfaces are split for cohesive elements; all: between all materials",
+        "pairs of materials between which interfaces are split for cohesive elements; all: between all materials; "
+        "a material twice: between all its elements",
         topic="elements",
     )
     extrude: float | None = option(
@@ -59,7 +60,7 @@ class ElementOptions:
     layers: int = option(1, "number of hexes over the thickness", least=1, topic="elements")
     periodic: str | None = None
     open_interfaces: bool = False
-    split_quads: bool = False
+    split_quads: bool = option(False, "cut each quad into two triangles", topic="elements")
     mark_interfaces: bool = True
 
     def __post_init__(self) -> None:

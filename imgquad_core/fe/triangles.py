@@ -59,7 +59,7 @@ def split_quads(mesh: FEMesh) -> FEMesh:
 
 
 def _cuts(mesh: FEMesh) -> Ints:
-    """0 where the diagonal from corner 0 is Delaunay's (the angles at corners 1 and 3 are 180 degrees at most), else 1."""
+    """0 where the diagonal from corner 0 is Delaunay's (angles at corners 1 and 3: 180 degrees at most), else 1."""
     p = mesh.points[mesh.cells]
     to = [(p[:, (k - 1) % 4] - p[:, k], p[:, (k + 1) % 4] - p[:, k]) for k in (1, 3)]
     sine = [b[:, 0] * a[:, 1] - b[:, 1] * a[:, 0] for a, b in to]

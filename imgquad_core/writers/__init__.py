@@ -14,6 +14,7 @@ from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.model import QuadMesh
 
 from .abaqus.write import write_abaqus
+from .ansys import write_ansys
 from .archive import write_npz
 from .converted import write_med, write_xdmf
 from .drawings import write_dxf, write_svg
@@ -28,6 +29,7 @@ Writer = Callable[..., None]
 WRITERS: Mapping[str, Writer] = MappingProxyType(
     {
         ".bdf": write_nastran,
+        ".cdb": write_ansys,
         ".dxf": write_dxf,
         ".e": write_exodus,
         ".inp": write_abaqus,

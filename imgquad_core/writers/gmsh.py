@@ -1,8 +1,8 @@
 """Gmsh mesh files (text, 4.1 and 2.2) with named physical groups.
 
 Each group is one entity whose tag is the group's: GetFEM reads entities for groups, getdp numbers over all dimensions.
-Node tags ascend through the file: OpenFOAM's gmshToFoam takes the n-th node for the one of the n-th smallest tag. Names come in the order
-sides, elements, points: ElmerGrid takes the dimension of the mesh for one less at each name of lower dimension.
+Node tags ascend through the file: OpenFOAM's gmshToFoam takes the n-th node for the one of the n-th smallest tag. Names
+come in the order sides, elements, points: ElmerGrid lowers its dimension at each name of a lower one.
 """
 
 from __future__ import annotations

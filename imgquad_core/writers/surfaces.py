@@ -1,4 +1,4 @@
-"""Files for mesh apps: OBJ, OFF, PLY and STL of the quads, with the materials' colours where there is a place."""
+"""Files for mesh apps: OBJ, OFF, PLY and STL of the faces, with the materials' colours where there is a place."""
 
 from __future__ import annotations
 
@@ -15,33 +15,42 @@ from .common import refuse_3d, refuse_cohesive, replacing, rows, safe_names, wri
 
 def write_obj(mesh: FEMesh, path: str | Path) -> None:
     """Write a Wavefront file (``.obj``): quads, a group for each material, the colours in a ``.mtl`` beside it."""
-    points, quads = _corners(mesh, "OBJ")
+    points, faces = _corners(mesh, "OBJ")
     with replacing(path) as temporary:
         library = temporary.with_suffix(".mtl")
-        for file, parts in ((library, _mtl(mesh)), (temporary, _obj(mesh, points, quads, library.name))):
+        for file, parts in ((library, _mtl(mesh)), (temporary, _obj(mesh, points, faces, library.name))):
             with file.open("w", encoding="utf-8", newline="\n") as stream:
                 stream.writelines(parts)
 
 
 def write_off(mesh: FEMesh, path: str | Path) -> None:
-    """Write an Object File Format file (``.off``): quads with colours."""
-    points, quads = _corners(mesh, "OFF")
-    body = rows("4 %d %d %d %d %d %d %d\n", quads, _colors(mesh))
-    head = f"OFF\n{len(points)} {len(quads)} 0\n"
+    """Write an Object File Format file (``.off``): quads with colours, or triangles without.
+
+    meshio, which reads it for PyVista, takes triangles without colours and nothing else.
+    """
+    points, faces = _corners(mesh, "OFF")
+    plain = faces.shape[1] == 3
+    body = rows("3 %d %d %d\n", faces) if plain else rows("4 %d %d %d %d %d %d %d\n", faces, _colors(mesh))
+    head = f"OFF\n{len(points)} {len(faces)} 0\n"
     write_text(path, [head, *rows("%.16g %.16g %.16g\n", points), *body])
 
 
 def write_ply(mesh: FEMesh, path: str | Path) -> None:
     """Write a Stanford file (``.ply``, binary little endian): quads with colours and the material number."""
-    points, quads = _corners(mesh, "PLY")
+    points, faces = _corners(mesh, "PLY")
     face = np.empty(
-        len(quads), [("n", "u1"), ("corners", "<i4", 4), ("color", "u1", 3), ("material", "<i4")]
+        len(faces), [("n", "u1"), ("corners", "<i4", faces.shape[1]), ("color", "u1", 3), ("material", "<i4")]
     )  # packed, as the header says
-    face["n"], face["corners"], face["color"], face["material"] = 4, quads, _colors(mesh), mesh.cell_material
+    face["n"], face["corners"], face["color"], face["material"] = (
+        faces.shape[1],
+        faces,
+        _colors(mesh),
+        mesh.cell_material,
+    )
     header = (
         f"ply\nformat binary_little_endian 1.0\ncomment imgquad-mesh\nelement vertex {len(points)}\n"
         "property double x\nproperty double y\nproperty double z\n"
-        f"element face {len(quads)}\nproperty list uchar int vertex_indices\n"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
         "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int material\nend_header\n"
     )
     with replacing(path) as temporary:
@@ -50,21 +59,23 @@ def write_ply(mesh: FEMesh, path: str | Path) -> None:
 
 def write_stl(mesh: FEMesh, path: str | Path) -> None:
     """Write a binary STL file (``.stl``): two triangles a quad; the attribute word is the material number."""
-    points, quads = _corners(mesh, "STL")
-    triangles = points[quads[:, [0, 1, 2, 0, 2, 3]]].reshape(-1, 3, 3)
+    points, faces = _corners(mesh, "STL")
+    corners = faces if faces.shape[1] == 3 else faces[:, [0, 1, 2, 0, 2, 3]]
+    triangles = points[corners].reshape(-1, 3, 3)
     facet = np.zeros(len(triangles), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     facet["normal"], facet["corners"] = (0, 0, 1), triangles
-    facet["attribute"] = np.repeat(mesh.cell_material, 2)
+    facet["attribute"] = np.repeat(mesh.cell_material, len(triangles) // len(faces))
     with replacing(path) as temporary:
         temporary.write_bytes(b"imgquad-mesh".ljust(80) + np.uint32(len(triangles)).tobytes() + facet.tobytes())
 
 
 def _corners(mesh: FEMesh, form: str) -> tuple[Floats, Ints]:
-    """Points and quads without the nodes between corners."""
+    """Points and faces without the nodes between corners."""
     refuse_3d(mesh, form)
     refuse_cohesive(mesh, form)
-    used, quads = np.unique(mesh.cells[:, :4], return_inverse=True)
-    return np.column_stack([mesh.points[used], np.zeros(len(used))]), quads.reshape(-1, 4)
+    n_corners = min(mesh.cells.shape[1], 4)
+    used, faces = np.unique(mesh.cells[:, :n_corners], return_inverse=True)
+    return np.column_stack([mesh.points[used], np.zeros(len(used))]), faces.reshape(-1, n_corners)
 
 
 def _colors(mesh: FEMesh) -> Bytes:
@@ -85,11 +96,11 @@ def _mtl(mesh: FEMesh) -> Iterator[str]:
             yield "newmtl {}\nKd {:.6f} {:.6f} {:.6f}\n".format(names[name], *colors[ids[0]])
 
 
-def _obj(mesh: FEMesh, points: Floats, quads: Ints, library: str) -> Iterator[str]:
+def _obj(mesh: FEMesh, points: Floats, faces: Ints, library: str) -> Iterator[str]:
     yield f"# imgquad-mesh\nmtllib {library}\n"
     yield from rows("v %.16g %.16g %.16g\n", points)
     sets = mesh.material_cells()
     names = safe_names(sets, 255)
     for name, ids in sets.items():
         yield f"g {names[name]}\nusemtl {names[name]}\n"
-        yield from rows("f %d %d %d %d\n", quads[ids] + 1)
+        yield from rows("f" + " %d" * faces.shape[1] + "\n", faces[ids] + 1)

@@ -13,31 +13,42 @@ from imgquad_mesh.texts import number
 from .declared_options import add_declared, asked
 
 #: options of the command that a writer takes under the same name
-WRITER_OPTIONS = ("analysis", "reduced", "thickness", "properties", "deck", "regions", "interfaces", "version")
+WRITER_OPTIONS = ("analysis", "reduced", "thickness", "properties", "deck", "regions", "interfaces", "version", "plain")
+#: options of the formats that PyVista writes
+PLAIN = {".vtu": ("plain",), ".vtk": ("plain",)}
+#: what --interfaces makes of the elements; the others are of writers
+BETWEEN = ("sides", "none")
 
 
 def add_element_options(parser: argparse.ArgumentParser) -> None:
     """Add what makes an `ElementOptions` and the options of the writers."""
     add_declared(parser, ElementOptions)
     add = parser.add_argument_group("solver files").add_argument
-    add("--analysis", metavar="NAME", help="'plane stress' (default), 'plane strain', axisymmetric, heat: .inp .bdf")
+    add("--analysis", metavar="NAME", help="'plane stress' (default), 'plane strain', axisymmetric, heat: .inp .bdf .cdb")
     add("--reduced", action="store_true", default=None, help="reduced integration (CPS4R ...): .inp")
-    add("--thickness", type=number, metavar="T", help="out of the plane (default: 1): .inp .bdf")
-    add("--properties", type=Path, metavar="TOML", help="values of the materials: .inp .bdf")
+    add("--thickness", type=number, metavar="T", help="out of the plane (default: 1): .inp .bdf .cdb")
+    add("--properties", type=Path, metavar="TOML", help="values of the materials: .inp .bdf .cdb")
     add("--deck", metavar="tension|thermal", help="a model that CalculiX runs as it is: .inp")
     add("--regions", action="store_true", default=None, help="an element set for each connected region, too: .inp")
     add(
         "--interfaces",
-        choices=("elements", "springs", "sides"),
-        help="between split sides: cohesive elements, springs (.inp), or nothing, just the sides as sets",
+        choices=("elements", "springs", *BETWEEN),
+        help="between split sides: cohesive elements, springs (.inp), or nothing, just the sides as sets; none: leave "
+        "out the sides that two materials share, for programs that take all named sides for the boundary",
     )
     add("--msh-version", dest="version_", metavar="V", help="4.1 (default) or 2.2: .msh")
+    add("--plain", action="store_true", default=None, help="numbers only, for meshio, SfePy, FElupe, MFEM: .vtu .vtk")
 
 
 def element_options(args: argparse.Namespace) -> ElementOptions:
     """Return the elements that `args` asks for."""
     periodic = None if args.periodic in (None, "none") else args.periodic
-    return ElementOptions(**asked(args, ElementOptions), periodic=periodic, open_interfaces=args.interfaces == "sides")
+    return ElementOptions(
+        **asked(args, ElementOptions),
+        periodic=periodic,
+        open_interfaces=args.interfaces == "sides",
+        mark_interfaces=args.interfaces != "none",
+    )
 
 
 def writer_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -53,10 +64,10 @@ def writer_options(args: argparse.Namespace) -> dict[str, Any]:
 
     asked = {name: getattr(args, "version_" if name == "version" else name, None) for name in WRITER_OPTIONS}
     given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
-    if given.get("interfaces") == "sides":  # not the writer's, see `element_options`
+    if given.get("interfaces") in BETWEEN:  # not the writer's, see `element_options`
         del given["interfaces"]
     extension = args.output.suffix.lower()
-    known = options_of(WRITERS[extension]) if extension in WRITERS else ()
+    known = options_of(WRITERS[extension]) if extension in WRITERS else PLAIN.get(extension, ())
     for name in given:
         if name not in known:
             option = "--msh-version" if name == "version" else f"--{name}"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
 from imgquad_core.model import QuadMesh
+from imgquad_core.writers.common import safe_names
 
 from .fields import MATERIAL_FIELDS, put_materials
 from .placement import PLAIN, Placement
@@ -154,6 +155,29 @@ def to_fe_grid(mesh: FEMesh) -> pv.UnstructuredGrid:
     grid.field_data["material_names"] = np.array(mesh.materials.names, np.str_)
     grid.field_data["material_colors"] = mesh.materials.colors
     grid.set_active_scalars("material", preference="cell")
+    return grid
+
+
+def plain_grid(mesh: FEMesh) -> pv.UnstructuredGrid:
+    """Return a grid for readers that know arrays of numbers only: no field arrays, no blanks in names.
+
+    Cell arrays `material` and, for SfePy, `mat_id`: 1, 2, ... in the order of `FEMesh.material_names`, then the sets of
+    cohesive elements; `region`. Point arrays `set_left` and so on.
+    """
+    grid = to_fe_grid(mesh)
+    number = np.empty(grid.n_cells, np.int32)
+    cohesive = [mesh.n_cells + ids for ids in mesh.cohesive_cells().values()]
+    for i, ids in enumerate([*mesh.material_cells().values(), *cohesive], 1):
+        number[ids] = i
+    grid.clear_field_data()
+    grid.clear_cell_data()
+    grid.cell_data["material"] = grid.cell_data["mat_id"] = number
+    grid.cell_data["region"] = np.append(mesh.cell_region, np.full(len(mesh.cohesive), -1)).astype(np.int32)
+    for name, safe in safe_names([f"set_{name}" for name in mesh.node_sets], 255).items():
+        member = grid.point_data.pop(f"set {name[4:]}")
+        grid.point_data[safe] = member.astype(np.int32)  # VTK writes bytes as colours, which meshio does not know
+    grid.set_active_scalars(None, preference="point")
+    grid.set_active_scalars("material", preference="cell")  # MFEM looks for them
     return grid
 
 

@@ -19,11 +19,14 @@ from imgquad_core.errors import InputError
 
 if TYPE_CHECKING:
     from imgquad_core.fe.elements import ElementOptions
+    from imgquad_core.fe.femesh import FEMesh
     from imgquad_core.model import LabelImage, QuadMesh
     from imgquad_core.pipeline import Run
 
 #: formats that PyVista writes
 GRID_EXTENSIONS = (".vtu", ".vtk", ".vtkhdf")
+LEGACY_TITLE = 250  #: signs; VTK takes 256 with the end of the line
+
 HDF_CHUNK = 25_000  #: values, in which VTK's HDF5 writer makes files longer
 
 
@@ -51,10 +54,12 @@ def mesh_extensions() -> tuple[str, ...]:
 
 def write_mesh_file(mesh: QuadMesh, path: Path, elements: ElementOptions | None = None, **options: Any) -> None:
     """Write `mesh`, as the `elements` asked for, in the format that the extension of `path` names."""
-    from imgquad_core.fe.elements import make_elements
+    from imgquad_core.fe import fe_mesh, make_elements
 
     made = make_elements(mesh, elements) if elements and not elements.plain else None
-    if path.suffix.lower() in GRID_EXTENSIONS:
+    if options.pop("plain", False):
+        _write_plain(made or fe_mesh(mesh), path)
+    elif path.suffix.lower() in GRID_EXTENSIONS:
         from imgquad_mesh.datasets.grids import to_fe_grid, to_grid
 
         grid = to_fe_grid(made) if made else to_grid(mesh)
@@ -63,6 +68,37 @@ def write_mesh_file(mesh: QuadMesh, path: Path, elements: ElementOptions | None 
         from imgquad_core.writers import write_mesh
 
         write_mesh(made or mesh, path, **options)
+
+
+def _write_plain(mesh: FEMesh, path: Path) -> None:
+    """Write ``.vtu`` or ``.vtk`` (text, 4.2) for other readers than VTK's; numbers of materials in a comment."""
+    from imgquad_core.writers.common import safe_names
+    from imgquad_mesh.datasets.grids import plain_grid
+
+    grid = plain_grid(mesh)
+    names = safe_names([*mesh.material_cells(), *mesh.cohesive_cells()], 255).values()
+    legend = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
+    save = _save_legacy if path.suffix.lower() == ".vtk" else _save_with_comment
+    replace_file(path, lambda temporary: save(grid, temporary, legend))
+
+
+def _save_legacy(grid: Any, path: Path, title: str) -> None:
+    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
+
+    writer = vtkUnstructuredGridWriter()
+    writer.SetFileVersion(42)  # 5.1 is read by VTK only
+    writer.SetHeader(title[:LEGACY_TITLE])
+    writer.SetInputData(grid)
+    writer.WriteToOutputStringOn()
+    if not writer.Write():
+        raise OSError("VTK cannot format .vtk")
+    path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
+
+
+def _save_with_comment(grid: Any, path: Path, comment: str) -> None:
+    save_dataset(grid, path)
+    head, body = path.read_text(encoding="utf-8").split("\n", 1)
+    path.write_text(f"{head}\n<!-- material: {comment} -->\n{body}", encoding="utf-8", newline="\n")
 
 
 def write_labels(image: LabelImage, path: Path) -> None:
