@@ -16,7 +16,7 @@ from imgquad_core.model import QuadMesh
 from .abaqus.write import write_abaqus
 from .ansys import write_ansys
 from .archive import write_npz
-from .converted import write_med, write_xdmf
+from .converted import write_med, write_unv, write_xdmf
 from .drawings import write_dxf, write_svg
 from .exodus import write_exodus
 from .gmsh import write_gmsh
@@ -24,6 +24,12 @@ from .nastran import write_nastran
 from .surfaces import write_obj, write_off, write_ply, write_stl
 
 Writer = Callable[..., None]
+
+#: formats that cannot hold cohesive elements, and what they are called in errors
+WITHOUT_COHESIVE: Mapping[str, str] = MappingProxyType(
+    {".bdf": "Nastran", ".cdb": "An Ansys archive", ".xdmf": "XDMF", ".obj": "OBJ", ".off": "OFF", ".ply": "PLY"}
+    | {".stl": "STL"}
+)
 
 #: writer of each extension; `.vtu`, `.vtk` and `.vtkhdf` are PyVista's own and live in the plugin
 WRITERS: Mapping[str, Writer] = MappingProxyType(
@@ -41,6 +47,7 @@ WRITERS: Mapping[str, Writer] = MappingProxyType(
         ".ply": write_ply,
         ".stl": write_stl,
         ".svg": write_svg,
+        ".unv": write_unv,
         ".xdmf": write_xdmf,
     }
 )

@@ -118,10 +118,15 @@ def points_3d(mesh: FEMesh) -> np.ndarray[Any, np.dtype[np.float64]]:
 def refuse_cohesive(mesh: FEMesh, form: str) -> None:
     """Raise where `form` cannot hold cohesive elements."""
     if len(mesh.cohesive):
-        raise InputError(
-            f"{form} has no cohesive elements; write .inp, .e, .msh, .vtu or .npz, or no elements between the sides "
-            "(interfaces: sides)"
-        )
+        raise InputError(no_cohesive(form))
+
+
+def no_cohesive(form: str) -> str:
+    """Text of the error where `form` cannot hold cohesive elements."""
+    return (
+        f"{form} has no cohesive elements; write .inp, .e, .msh, .vtu or .npz, or no elements between the sides "
+        "(interfaces: sides)"
+    )
 
 
 def refuse_six_nodes(mesh: FEMesh, form: str, remedy: str = "") -> None:

@@ -1,4 +1,4 @@
-"""Formats that kept libraries write right: MED by Gmsh, XDMF by meshio. Both are extras."""
+"""Formats that kept libraries write right: MED and UNV by Gmsh, XDMF by meshio. These are extras."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from .common import points_3d, refuse_cohesive, refuse_six_nodes, replacing, tak
 from .gmsh import gmsh_text
 
 OVERHEAD = 200_000  #: bytes of an HDF5 file besides the arrays, at most
+MOST_TIMES = 6  #: a universal file is this much longer than its .msh, at most
 MED_NAME_LIMIT = 80  #: Gmsh cuts longer ones off
+UNV_NAME_LIMIT = 80  #: what the format has
 MESHIO_KINDS = {"tri3": "triangle", "quad4": "quad", "quad8": "quad8", "quad9": "quad9", "hex8": "hexahedron"}
 
 
@@ -27,13 +29,34 @@ def write_med(mesh: FEMesh, path: str | Path) -> None:
     InputError
         The Python package gmsh is not installed, six-node cohesive elements, or a name of more than 80 signs.
     """
-    gmsh = _needed("gmsh", ".med")
-    refuse_six_nodes(mesh, "Gmsh, which writes .med,")
+    _by_gmsh(mesh, path, MED_NAME_LIMIT)
+
+
+def write_unv(mesh: FEMesh, path: str | Path) -> None:
+    """Write an I-DEAS universal file (``.unv``) for Salome, Code_Aster and others, with named groups; by Gmsh.
+
+    Nodes are dataset 2411, elements 2412, groups of elements, sides and corners 2477.
+
+    Raises
+    ------
+    InputError
+        The Python package gmsh is not installed, quads of nine nodes, six-node cohesive elements, or a name of more
+        than 80 signs.
+    """
+    if mesh.kind == "quad9":
+        raise InputError("UNV has no quads of nine nodes: take eight (--nodes 8), or write .med or .msh")
+    _by_gmsh(mesh, path, UNV_NAME_LIMIT)
+
+
+def _by_gmsh(mesh: FEMesh, path: str | Path, name_limit: int) -> None:
+    extension = Path(path).suffix.lower()
+    gmsh = _needed("gmsh", extension)
+    refuse_six_nodes(mesh, f"Gmsh, which writes {extension},")
     with replacing(path) as temporary:
         source = temporary.with_suffix(".msh")
         with source.open("w", encoding="utf-8", newline="\n") as stream:
-            stream.writelines(gmsh_text(mesh, name_limit=MED_NAME_LIMIT))
-        take_room(temporary.parent, 2 * (points_3d(mesh).nbytes + mesh.cells.nbytes) + OVERHEAD)
+            stream.writelines(gmsh_text(mesh, name_limit=name_limit))
+        take_room(temporary.parent, MOST_TIMES * source.stat().st_size + OVERHEAD)
         gmsh.initialize(interruptible=False)
         try:
             gmsh.option.setNumber("General.Terminal", 0)

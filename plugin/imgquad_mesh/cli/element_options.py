@@ -60,7 +60,8 @@ def writer_options(args: argparse.Namespace) -> dict[str, Any]:
         The format has no such option, or the file of properties cannot be used: said before any work is done.
     """
     from imgquad_core.fe.properties import read_properties
-    from imgquad_core.writers import WRITERS, options_of
+    from imgquad_core.writers import WITHOUT_COHESIVE, WRITERS, options_of
+    from imgquad_core.writers.common import no_cohesive
 
     asked = {name: getattr(args, "version_" if name == "version" else name, None) for name in WRITER_OPTIONS}
     given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
@@ -73,6 +74,8 @@ def writer_options(args: argparse.Namespace) -> dict[str, Any]:
             option = "--msh-version" if name == "version" else f"--{name}"
             option += f" {given[name]}" if name == "interfaces" else ""
             raise InputError(f"{extension} files have no {option}: leave it out, or write another format")
+    if args.cohesive and args.interfaces != "sides" and extension in WITHOUT_COHESIVE:
+        raise InputError(no_cohesive(WITHOUT_COHESIVE[extension]))
     if "properties" in given:
         given["properties"] = read_properties(given["properties"])
     return given
