@@ -43,8 +43,8 @@ def fe_mesh(mesh: QuadMesh) -> FEMesh:
         junctions            where three or more boundaries meet
         ==================== ======================================== ==========================================
 
-        Sets of elements are `at_interface_A_B`, of A and B with a node on their interface, and `at_interfaces`, with
-        one on any.
+        Sets of elements are `interface_A_B`, those of A and B with a node on their interface, and `interfaces`, those
+        with one on any.
 
     Raises
     ------
@@ -168,11 +168,11 @@ def _at_interfaces(mesh: QuadMesh, names: dict[int, str]) -> dict[str, Ints]:
     cell, pair = _touching(mesh, _ends(mesh, lower), of.ravel(), len(pairs))
     between = (mesh.quad_material[cell][:, None] == pairs[pair]).any(axis=1)
     claimed = Names(names.values())
-    sets = {claimed.claim("at_interfaces"): np.unique(cell)}
+    sets = {claimed.claim("interfaces"): np.unique(cell)}
     order = np.lexsort((cell[between], pair[between]))
     ends = np.cumsum(np.bincount(pair[between], minlength=len(pairs)))
     for (a, b), cells in zip(pairs.tolist(), np.split(cell[between][order], ends[:-1]), strict=True):
-        sets[claimed.claim(f"at_interface_{names[a]}_{names[b]}")] = cells
+        sets[claimed.claim(f"interface_{names[a]}_{names[b]}")] = cells
     return sets
 
 

@@ -72,7 +72,8 @@ def write_ansys(
 
     Notes
     -----
-    Components are node sets, and element sets of materials and of elements at interfaces.
+    Components are node sets, and element sets of materials and of elements at interfaces. As their names are short,
+    `interface_A_B` is I_A_B of nodes and EI_A_B of elements.
 
     Raises
     ------
@@ -126,8 +127,14 @@ def _components(mesh: FEMesh) -> Iterator[str]:
     named += [("NODE", name, ids) for name, ids in mesh.node_sets.items()]
     claimed = Names(RESERVED)  # one name space for both kinds
     for what, name, ids in named:
-        label = claimed.claim(safe_names([name], NAME_LIMIT, upper=True)[name])
+        label = claimed.claim(_label(what, name))
         yield from _component(label, what, _ranges(ids + 1))
+
+
+def _label(what: str, name: str) -> str:
+    if name.startswith("interface_"):
+        name = ("EI_" if what == "ELEM" else "I_") + name.removeprefix("interface_")
+    return safe_names([name], NAME_LIMIT, upper=True)[name]
 
 
 def _component(name: str, what: str, items: Ints) -> Iterator[str]:
