@@ -18,7 +18,7 @@ k = fem.Function(fem.FunctionSpace(mesh, ("DG", 0)))
 k.x.array[materials.indices] = np.array([1.0, 10.0])[materials.values]
 V = fem.FunctionSpace(mesh, ("CG", 1))
 held = [fem.locate_dofs_topological(V, 1, sides.indices[sides.values == side]) for side in (1, 2)]  # left, right
-bcs = [fem.dirichletbc(value, dofs, V) for value, dofs in zip((0.0, 1.0), held)]
+bcs = [fem.dirichletbc(value, dofs, V) for value, dofs in zip((0.0, 1.0), held, strict=True)]
 u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
 a = k * ufl.dot(ufl.grad(u), ufl.grad(v)) * ufl.dx
 L = fem.Constant(mesh, 0.0) * v * ufl.dx

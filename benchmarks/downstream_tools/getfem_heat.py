@@ -1,11 +1,12 @@
 """Heat through two layers in GetFEM: `getfem_heat.py FILE.msh`."""
 
 import sys
+from pathlib import Path
 
 import getfem as gf
 
 names = {}
-for line in open(sys.argv[1]).read().partition("$PhysicalNames\n")[2].partition("$End")[0].splitlines()[1:]:
+for line in Path(sys.argv[1]).read_text().partition("$PhysicalNames\n")[2].partition("$End")[0].splitlines()[1:]:
     dimension, tag, name = line.split(maxsplit=2)
     names[name.strip('"')] = int(tag)
 mesh = gf.Mesh("import", "gmsh", sys.argv[1])

@@ -1,13 +1,14 @@
 """Heat through two layers in MFEM: `mfem_heat.py FILE.msh`."""
 
 import sys
+from pathlib import Path
 
 import mfem.ser as mfem
 import numpy as np
 
 mesh = mfem.Mesh(sys.argv[1], 1, 1)
 names = {}  # MFEM keeps them as attribute sets; the numbers stand in the file
-for line in open(sys.argv[1]).read().partition("$PhysicalNames\n")[2].partition("$End")[0].splitlines()[1:]:
+for line in Path(sys.argv[1]).read_text().partition("$PhysicalNames\n")[2].partition("$End")[0].splitlines()[1:]:
     dimension, tag, name = line.split(maxsplit=2)
     names[name.strip('"')] = int(tag)
 conductivity = mfem.Vector([1.0] * mesh.attributes.Max())

@@ -15,6 +15,7 @@ from imgquad_core.fe.elements import ElementOptions, make_elements
 from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 from imgquad_mesh.datasets.grids import from_grid, to_fe_grid, to_grid
+from imgquad_mesh.outputs.files import write_mesh_file
 from support.handmade import disk, jiggle, round_inclusion, staircase
 
 MESH = staircase(disk(10, 3), ("matrix", "disk"), jiggle)
@@ -129,3 +130,52 @@ def test_orders_that_are_not_made_are_refused() -> None:
         ElementOptions(order=3)
     with pytest.raises(InputError, match="exclude each other"):
         ElementOptions(order=2, extrude=1.0)
+
+
+@pytest.mark.parametrize("extension", [".vtu", ".vtk"])
+@pytest.mark.parametrize(
+    "options",
+    [ElementOptions(), ElementOptions(order=2), ElementOptions(order=2, nodes=9), ElementOptions(extrude=2.0)],
+)
+def test_meshio_reads_plain_grids(tmp_path: Path, extension: str, options: ElementOptions) -> None:
+    meshio = pytest.importorskip("meshio")
+    write_mesh_file(MESH, tmp_path / f"a{extension}", options, plain=True)
+    mesh, read = make_elements(MESH, options), meshio.read(tmp_path / f"a{extension}")
+    (block,) = read.cells
+    assert (block.data == mesh.cells).all()
+    assert np.abs(read.points[:, :2] - mesh.points[:, :2]).max() < 1e-9
+    for name in ("material", "mat_id"):
+        assert (read.cell_data[name][0] == mesh.cell_material + 1).all()
+    for name, ids in mesh.node_sets.items():
+        assert (np.flatnonzero(read.point_data[f"set_{name}"]) == ids).all()
+    grid = pv.read(tmp_path / f"a{extension}")
+    assert (grid["material"] == mesh.cell_material + 1).all()
+    assert "1 matrix, 2 disk" in (tmp_path / f"a{extension}").read_text()[:200]
+
+
+def test_a_grid_without_its_names_is_read_by_meshio(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    grid = to_grid(MESH)
+    grid.save(tmp_path / "a.vtu")
+    with pytest.raises(SystemExit):  # no form of a text array is read by both VTK and meshio, see docs/fe/meshio.md
+        meshio.read(tmp_path / "a.vtu")
+    del grid.field_data["material_names"]
+    grid.save(tmp_path / "a.vtu")
+    assert (meshio.read(tmp_path / "a.vtu").cells_dict["quad"] == MESH.quads).all()
+
+
+def test_interfaces_may_be_left_out(tmp_path: Path) -> None:
+    grid = to_grid(MESH)
+    grid.save(tmp_path / "a.msh", interfaces="none")
+    assert "interface" not in (tmp_path / "a.msh").read_text()
+    grid.save(tmp_path / "a.inp", interfaces="none")
+    text = (tmp_path / "a.inp").read_text()
+    assert "S_INTERFACE" not in text
+    assert "*NSET, NSET=INTERFACE_MATRIX_DISK" in text
+
+
+def test_triangles_are_cut_of_quads(tmp_path: Path) -> None:
+    to_grid(MESH).save(tmp_path / "a.inp", split_quads=True)
+    assert "TYPE=CPS3" in (tmp_path / "a.inp").read_text()
+    write_mesh_file(MESH, tmp_path / "a.vtu", ElementOptions(split_quads=True))
+    assert set(pv.read(tmp_path / "a.vtu").celltypes) == {pv.CellType.TRIANGLE}

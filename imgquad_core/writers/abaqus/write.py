@@ -72,8 +72,8 @@ def write_abaqus(
     thickness : float
         Out of the plane, in the unit of the points.
     properties : path or mapping, optional
-        Material values: see `imgquad_core.fe.properties`. Without them each material is a stub to fill in. A region that
-        has values of its own becomes a material with a section of its own.
+        Material values: see `imgquad_core.fe.properties`. Without them each material is a stub to fill in.
+        A region that has values of its own becomes a material with a section of its own.
     deck : str, optional
         ``tension`` (left held, right pulled by 0.1 % of the width) or ``thermal`` (left at 0, right at 1): a model
         that runs as it is (in CalculiX; for Abaqus give ``thermal`` the analysis ``heat``).

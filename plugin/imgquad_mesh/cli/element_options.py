@@ -24,7 +24,11 @@ def add_element_options(parser: argparse.ArgumentParser) -> None:
     """Add what makes an `ElementOptions` and the options of the writers."""
     add_declared(parser, ElementOptions)
     add = parser.add_argument_group("solver files").add_argument
-    add("--analysis", metavar="NAME", help="'plane stress' (default), 'plane strain', axisymmetric, heat: .inp .bdf .cdb")
+    add(
+        "--analysis",
+        metavar="NAME",
+        help="'plane stress' (default), 'plane strain', axisymmetric, heat: .inp .bdf .cdb",
+    )
     add("--reduced", action="store_true", default=None, help="reduced integration (CPS4R ...): .inp")
     add("--thickness", type=number, metavar="T", help="out of the plane (default: 1): .inp .bdf .cdb")
     add("--properties", type=Path, metavar="TOML", help="values of the materials: .inp .bdf .cdb")

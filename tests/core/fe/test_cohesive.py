@@ -203,3 +203,19 @@ def test_open_interfaces_have_two_sides_in_any_format(tmp_path: Path, order: int
         gmsh.finalize()
     assert len(nodes["interface_air_iron"]) == len(nodes["interface_iron_air"]) == 2 * order + 1
     assert nodes["interface_air_iron"].isdisjoint(nodes["interface_iron_air"])
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_material_twice_is_cut_between_all_its_elements(order: int) -> None:
+    whole = three(order)
+    mesh = split_interfaces(whole, [("iron", "iron"), ("air", "iron")])
+    iron = np.flatnonzero(mesh.cell_material == 2)
+    assert len(np.unique(mesh.cells[iron][:, :4])) == 4 * len(iron)  # no two share a node
+    inside = (mesh.cohesive_pair == 2).all(axis=1)
+    assert inside.sum() == 10  # of 4 x 2 quads: 4 + 6 inner sides
+    assert set(mesh.cohesive_cells()) == {"cohesive_air_iron", "cohesive_iron_iron"}
+    p = mesh.points[mesh.cohesive]
+    assert (p[:, 0] == p[:, 3]).all()
+    assert (p[:, 1] == p[:, 2]).all()
+    others = np.isin(mesh.cell_material, (0, 1))
+    assert (mesh.points[mesh.cells[others]] == whole.points[whole.cells[others]]).all()

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from imgquad_core.errors import InputError
+from imgquad_core.fe.cohesive import split_interfaces
+from imgquad_core.fe.extrusion import extrude
 from imgquad_core.fe.femesh import KINDS, FEMesh, Names
-from imgquad_core.fe.sets import fe_mesh
+from imgquad_core.fe.sets import fe_mesh, without_interfaces
 from imgquad_core.model import VOID
 from support.handmade import disk, jiggle, staircase
 
@@ -108,3 +110,30 @@ def test_a_mesh_without_quads_is_refused() -> None:
     )  # fmt: skip
     with pytest.raises(InputError, match="no quads"):
         fe_mesh(empty)
+
+
+def test_elements_at_an_interface_touch_it_with_a_node() -> None:
+    mesh = fe_mesh(staircase(np.repeat(np.repeat(THREE, 3, axis=0), 3, axis=1), ("air", "clay", "iron"), jiggle))
+    names = {0: "air", 1: "clay", 2: "iron"}
+    everywhere = set()
+    for a, b in ((0, 1), (0, 2), (1, 2)):
+        on = mesh.node_sets[f"interface_{names[a]}_{names[b]}"]
+        expected = np.isin(mesh.cells, on).any(axis=1) & np.isin(mesh.cell_material, (a, b))
+        assert (mesh.element_sets[f"interface_{names[a]}_{names[b]}"] == np.flatnonzero(expected)).all()
+        everywhere |= set(np.flatnonzero(np.isin(mesh.cells, on).any(axis=1)))
+    assert set(mesh.element_sets["interfaces"]) == everywhere
+    assert fe_mesh(staircase(np.zeros((2, 2), int))).element_sets == {}
+
+
+def test_without_interfaces_the_named_sides_are_the_boundary() -> None:
+    mesh = without_interfaces(three())
+    assert set(mesh.side_sets) == {"left", "right", "bottom", "top"}
+    assert sum(len(sides) for sides in mesh.side_sets.values()) == 14
+    assert mesh.node_sets.keys() == three().node_sets.keys()
+    extruded = without_interfaces(extrude(three(), 1.0))
+    assert set(extruded.side_sets) == {"left", "right", "bottom", "top", "back", "front"}
+    split = split_interfaces(three(), [("air", "clay")])  # what was split is boundary
+    assert {n for n in without_interfaces(split).side_sets if n.startswith("interface")} == {
+        "interface_air_clay",
+        "interface_clay_air",
+    }

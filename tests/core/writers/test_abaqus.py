@@ -110,3 +110,55 @@ def test_same_mesh_same_bytes(tmp_path: Path) -> None:
     write_mesh(MESH, tmp_path / "a.inp", deck="tension", properties=STEEL)
     write_mesh(MESH, tmp_path / "b.inp", deck="tension", properties=STEEL)
     assert (tmp_path / "a.inp").read_bytes() == (tmp_path / "b.inp").read_bytes()
+
+
+GRAINS = """
+["*"]
+young = 1.0
+["Ein Kreis!"]
+user_material = [1, 2.5, 3, 4, 5, 6, 7, 8, 9]
+depvar = 12
+orientation = [1, 0, 0, 0, 1, 0]
+["matrix_region_2"]
+user_material = [0.0, 45.0, 0.0]
+abaqus = ["*PLASTIC", "200., 0."]
+"""
+
+
+def test_grains_have_constants_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "g.toml").write_text(GRAINS)
+    picture = disk(12, 3)
+    picture[:, 1] = 1  # cuts a strip off the matrix, region 1 or 2
+    mesh = fe_mesh(staircase(picture, ("matrix", "Ein Kreis!")))
+    write_mesh(mesh, tmp_path / "a.inp", properties=tmp_path / "g.toml")
+    text = (tmp_path / "a.inp").read_text()
+    assert (
+        "*MATERIAL, NAME=EIN_KREIS\n*ELASTIC\n1., 0.\n*DEPVAR\n12\n*USER MATERIAL, CONSTANTS=9\n"
+        "1., 2.5, 3., 4., 5., 6., 7., 8.\n9.\n*ORIENTATION, NAME=O_EIN_KREIS, SYSTEM=RECTANGULAR\n"
+        "1., 0., 0., 0., 1., 0.\n*SOLID SECTION, ELSET=EIN_KREIS, MATERIAL=EIN_KREIS, ORIENTATION=O_EIN_KREIS\n"
+    ) in text
+    assert (
+        "*MATERIAL, NAME=MATRIX_REGION_2\n*ELASTIC\n1., 0.\n*USER MATERIAL, CONSTANTS=3\n0., 45., 0.\n"
+        "*PLASTIC\n200., 0.\n*SOLID SECTION, ELSET=MATRIX_REGION_2, MATERIAL=MATRIX_REGION_2\n"
+    ) in text
+    blocks = keyword_blocks(tmp_path / "a.inp")
+    sections = [line.split("ELSET=")[1].split(",")[0] for line in text.splitlines() if line.startswith("*SOLID")]
+    elements = [int(i) for name in sections for row in blocks[f"*ELSET, ELSET={name}"] for i in row]
+    assert sorted(elements) == list(range(1, mesh.n_cells + 1))  # each element has one section
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"matrix": {"user_material": [1, "x"]}}, "must be a list of 1 or more numbers"),
+        ({"matrix": {"user_material": 3}}, "must be a list"),
+        ({"matrix": {"orientation": [1, 0, 0]}}, "must be a list of 6 numbers"),
+        ({"matrix": {"depvar": 1.5}}, "must be a whole number"),
+        ({"matrix": {"abaqus": ["200., 0."]}}, "the first one a keyword"),
+        ({"matrix_region_9": {"young": 1}}, "there is no region 'matrix_region_9'"),
+    ],
+)
+def test_values_of_ones_own_are_checked(tmp_path: Path, table: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        write_mesh(MESH, tmp_path / "a.inp", properties=table)
+    assert list(tmp_path.iterdir()) == []

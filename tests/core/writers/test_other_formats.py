@@ -138,7 +138,7 @@ def test_the_archive_holds_everything(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("extension", sorted(WRITERS))
 def test_a_disk_that_fills_up_leaves_the_old_file_and_no_half_one(tmp_path: Path, extension: str) -> None:
-    for package in {".med": ["gmsh"], ".xdmf": ["meshio", "h5py"]}.get(extension, []):
+    for package in {".med": ["gmsh"], ".unv": ["gmsh"], ".xdmf": ["meshio", "h5py"]}.get(extension, []):
         pytest.importorskip(package)
     target = tmp_path / f"a{extension}"
     target.write_text("old")
@@ -193,3 +193,23 @@ def test_unknown_formats_and_places_are_named(tmp_path: Path) -> None:
         writer_for("a.foo")
     with pytest.raises(InputError, match=r"cannot write .*No such file or directory"):
         write_mesh(MESH, tmp_path / "nowhere" / "a.inp")
+
+
+def test_universal_files_have_nodes_elements_and_groups(tmp_path: Path) -> None:
+    pytest.importorskip("gmsh")
+    write_mesh(MESH, tmp_path / "a.unv")
+    parts = (tmp_path / "a.unv").read_text().split("    -1\n")
+    data = {part.split("\n", 1)[0].strip(): part.split("\n")[1:-1] for part in parts if part.strip()}
+    points = np.array([line.replace("D", "E").split() for line in data["2411"][1::2]], float)
+    numbers = np.array([line.split()[0] for line in data["2411"][::2]], int)
+    assert np.abs(points[:, :2] - FE.points[numbers - 1]).max() < 1e-12
+    groups = {}
+    lines = iter(data["2477"])
+    for head in lines:
+        count, name = int(head.split()[7]), next(lines).strip()
+        entries = [int(v) for _ in range((count + 1) // 2) for v in next(lines).split()]
+        groups[name] = entries[1::4]
+    counts = {name: len(ids) for name, ids in groups.items()}
+    assert counts.items() >= {name: len(ids) for name, ids in FE.material_cells().items()}.items()
+    assert counts["left"] == len(FE.side_sets["left"])
+    assert counts["interface_matrix_disk"] == len(FE.side_sets["interface_matrix_disk"])

@@ -90,6 +90,10 @@ def test_grids_take_all_elements(picture: Path) -> None:
         ("a.msh", ["--order", "2", "--cohesive", "all"], "Gmsh has no six-node cohesive elements"),
         ("a.e", ["--order", "2", "--cohesive", "all"], "Exodus has no six-node cohesive elements"),
         ("a.bdf", ["--cohesive", "all"], "Nastran has no cohesive elements; write .inp"),
+        ("a.cdb", ["--cohesive", "all"], "An Ansys archive has no cohesive elements"),
+        ("a.inp", ["--split-quads", "--extrude", "2"], "exclude each other"),
+        ("a.msh", ["--plain"], ".msh files have no --plain"),
+        ("a.unv", ["--order", "2", "--nodes", "9"], "UNV has no quads of nine nodes"),
         ("a.e", ["--interfaces", "sides"], "say which, with cohesive"),
         ("a.inp", ["--interfaces", "springs"], "no interface was split"),
         ("a.inp", ["--analysis", "heat", "--reduced"], "no elements of reduced integration"),
@@ -114,3 +118,21 @@ def test_calculix_runs_a_periodic_cell(picture: Path, directions: str) -> None:
     assert run(picture, "a.inp", "--periodic", directions, "--deck", "tension", "--properties", toml) == 0
     stress = solve(picture.parent / "a.inp", "*EL PRINT, ELSET=EALL\nS")["stresses"]
     assert np.abs(stress[:, [2, 3, 5]] - [210, 0, 0]).max() < 1e-4
+
+
+def test_the_command_takes_the_options_of_other_programs(picture: Path) -> None:
+    assert run(picture, "a.msh", "--interfaces", "none", "--split-quads", "--msh-version", "2.2") == 0
+    text = (picture.parent / "a.msh").read_text()
+    assert "interface" not in text
+    assert '"left"' in text
+    assert run(picture, "a.vtu", "--plain") == 0
+    assert set(np.unique(pv.read(picture.parent / "a.vtu")["mat_id"])) == {1, 2}
+    assert run(picture, "a.inp", "--cohesive", "material 1:material 1") == 0
+    assert "ELSET=COHESIVE_MATERIAL_1_MATERIAL_1" in (picture.parent / "a.inp").read_text()
+
+
+def test_cohesive_elements_are_refused_before_anything_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(tmp_path / "there is no such picture.npy", "a.bdf", "--cohesive", "all") == 2
+    assert "Nastran has no cohesive elements" in capsys.readouterr().err
