@@ -36,8 +36,16 @@ class MeshOptions:
         The same in single materials, by name or number.
     growth : float
         Largest ratio of the sizes of neighbouring elements.
-    colors : "auto", "exact", int or sequence of RGB
+    colors : "auto", "exact", "regions", int or sequence of RGB
         How colours become materials; see `SegmentationOptions`.
+    flatten : "auto" or "off"
+        Whether uneven light is taken out of grey pictures.
+    marks : path or array_like, optional
+        Pixels whose material is known, from which materials grow.
+    learn : bool
+        Whether what looks like the marks is a mark, too.
+    fill_void : int
+        Void clusters of at most so many pixels go to the material around.
     min_pixels : "auto" or int
         Clusters of fewer pixels are noise if they are also shorter than `min_length`.
     min_length : "auto" or float
@@ -78,6 +86,10 @@ class MeshOptions:
     )
     growth: float = same_as(SmoothingOptions, "growth")
     colors: Any = same_as(SegmentationOptions, "colors")
+    flatten: str = same_as(SegmentationOptions, "flatten")
+    marks: Any = same_as(SegmentationOptions, "marks")
+    learn: bool = same_as(SegmentationOptions, "learn")
+    fill_void: int = same_as(SegmentationOptions, "fill_void")
     min_pixels: int | Literal["auto"] = same_as(
         DenoiseOptions,
         "min_pixels",
@@ -148,7 +160,14 @@ class MeshOptions:
 
     def segmentation(self) -> SegmentationOptions:
         """Return the options of segmentation."""
-        return SegmentationOptions(colors=self.colors, drop_transparent=self.drop_transparent)
+        return SegmentationOptions(
+            colors=self.colors,
+            flatten=self.flatten,
+            marks=self.marks,
+            learn=self.learn,
+            fill_void=self.fill_void,
+            drop_transparent=self.drop_transparent,
+        )
 
     def noise(self, quantised: bool, shape: tuple[int, int]) -> DenoiseOptions:
         """Return the limits of noise in a picture of `shape`."""

@@ -181,7 +181,7 @@ def read_source(source: Source, options: ReadOptions | None = None) -> Picture |
     """Return the picture that a path names; arrays and `LabelImage` as they are."""
     if isinstance(source, (str, Path)):
         return read_picture(source, options)
-    return source if isinstance(source, LabelImage) else np.asarray(source)
+    return source if isinstance(source, LabelImage) else np.asanyarray(source)
 
 
 def extract(labels: LabelImage, options: ExtractionOptions | None = None) -> BoundaryGraph:

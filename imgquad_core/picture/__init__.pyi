@@ -1,3 +1,4 @@
+from .marks import Marks, marks_of
 from .noise import Removal, automatic_limits, list_removed, remove_noise
 from .options import DenoiseOptions, ReadOptions, SegmentationOptions
 from .picture import Picture, picture_of
@@ -8,6 +9,7 @@ from .selection import Box, assert_solid, crop_image, drop_materials, material_n
 __all__ = [
     "Box",
     "DenoiseOptions",
+    "Marks",
     "Picture",
     "ReadOptions",
     "Removal",
@@ -18,6 +20,7 @@ __all__ = [
     "crop_image",
     "drop_materials",
     "list_removed",
+    "marks_of",
     "material_number",
     "picture_of",
     "read_picture",

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Bytes, Flags, Ints, Labels
 from imgquad_core.errors import InputError
-from imgquad_core.jit import kernel
 from imgquad_core.model import VOID, LabelImage, Materials
 
+from .codes import codes_of, numbered, values_of_codes
+from .flat_colours import without_blends
 from .picture import Picture
 
-#: up to this many values are numbered without sorting all pixels
-FEW = 256
 #: grey labels whose levels are nearer than this are shown in colours instead
 VISIBLE = 8
 
 
-def exact_labels(picture: Picture, most: int, must: bool, void: Flags | None) -> LabelImage | None:
+class Exact(NamedTuple):
+    """Materials that are values, and how many colours were blends of them."""
+
+    image: LabelImage
+    blends: int  #: distinct colours that were given to one of their sides
+
+
+def exact_labels(picture: Picture, most: int, void: Flags | None, with_blends: bool = True) -> Exact | None:
     """Return one material per value or colour, or None where there are more than `most` of them.
 
     Parameters
@@ -29,99 +35,77 @@ def exact_labels(picture: Picture, most: int, must: bool, void: Flags | None) ->
         What was read.
     most : int
         Limit of the number of materials.
-    must : bool
-        Whether values that cannot be material numbers are an error (else None is returned).
     void : bool, shape (n_rows, n_cols), optional
-        Pixels that become `VOID`.
+        Pixels that become `VOID`, as do those of -1 in signed integers.
+    with_blends : bool
+        Whether colours that occur at rims only are materials; else they go to one of their sides.
+
+    Raises
+    ------
+    InputError
+        For whole numbers that cannot be material numbers.
     """
-    codes = codes_of(picture, must)
-    if codes is None:
-        return None
+    codes, void = codes_of(picture.values), with_minus_one(picture.values, void)
     if void is not None:
-        codes[void] = VOID
-    distinct = _distinct(codes, most)
-    if distinct is None:
+        if void.all():
+            raise InputError(f"{picture.name} holds no pixel with a material: all are void")
+        codes = np.where(void, codes.ravel()[void.argmin()], codes)
+    found = numbered(codes, most)
+    if found is None:
         return None
-    values, numbers = distinct
-    is_void = values == VOID
-    labels, materials = _materials(picture, values[~is_void])
-    table = np.full(len(values), VOID, np.int32)
-    table[~is_void] = labels
-    return LabelImage(table[numbers], materials)
+    flat = found if with_blends else without_blends(picture, found)
+    labels, materials = _materials(picture, flat.codes)
+    image = labels[flat.numbers]
+    if void is not None:
+        image[void] = VOID
+    return Exact(LabelImage(image, materials), len(found.codes) - len(flat.codes))
 
 
-def codes_of(picture: Picture, must: bool) -> Ints | None:
-    """Return one integer for each pixel, the same for the same colour; None for greys that are not whole numbers."""
-    values = picture.values
-    if values.ndim == 3:
-        bits = 8 * values.dtype.itemsize
-        red, green, blue = (values[..., k].astype(np.int64) for k in range(3))
-        return (red << 2 * bits) | (green << bits) | blue
-    low, high = values.min(), values.max()
-    whole = values.dtype.kind in "iu" or bool((values == np.rint(values)).all())
-    if whole and low >= VOID and high <= np.iinfo(np.int32).max:
-        return values.astype(np.int64)
-    if picture.labels or (must and whole):
+def with_minus_one(values: NDArray[Any], void: Flags | None) -> Flags | None:
+    """Return void pixels with those of -1, which stands for no material in signed numbers."""
+    if values.ndim == 3 or values.dtype.kind not in "if" or not (values.min() == VOID and _whole(values)):
+        return void
+    return np.asarray(values == VOID if void is None else void | (values == VOID))
+
+
+def _whole(values: NDArray[Any]) -> bool:
+    return values.dtype.kind in "biu" or bool((values == np.rint(values)).all())
+
+
+def _materials(picture: Picture, codes: NDArray[Any]) -> tuple[Labels, Materials]:
+    """Return the label of each distinct code (ascending), and the materials."""
+    values = values_of_codes(codes, picture.values)
+    if values.ndim == 2:
+        return _materials_of_colors(values, 8 * picture.values.dtype.itemsize)
+    if not _whole(values):
+        return _materials_of_reals(values)
+    low, high = int(values.min()), int(values.max())
+    if low < 0 or high > np.iinfo(np.int32).max:
         raise InputError(
             f"{picture.name} holds labels from {low} to {high}: give numbers from 0 to 2147483647 (-1 is void)"
         )
-    if must:
-        raise InputError(f"{picture.name} holds greys that are not whole numbers: give a number of colours, or auto")
-    return None
+    labels = values.astype(np.int32)
+    order = np.argsort(labels, kind="stable")  # bits of floats are in the order of the numbers, but wide integers wrap
+    names = tuple((picture.names or {}).get(label, f"material {label}") for label in labels[order].tolist())
+    return labels, Materials(labels[order], names, _colors_of_values(picture, labels[order].astype(np.int64)))
 
 
-def _distinct(codes: Ints, most: int) -> tuple[Ints, Labels] | None:
-    """Return the distinct codes, ascending, and the place of each pixel's; None where `most` and void are fewer."""
-    found = np.empty(min(most + 1, FEW), np.int64)
-    numbers = np.empty(codes.shape, np.int32)
-    n = number_codes(codes, found, numbers)
-    if n <= len(found):
-        order = np.argsort(found[:n])
-        place = np.empty(n, np.int32)
-        place[order] = np.arange(n)
-        values, numbers = found[order], place[numbers]
-    elif most < FEW:
-        return None
-    else:
-        values, places = np.unique(codes, return_inverse=True)
-        numbers = places.reshape(codes.shape).astype(np.int32)
-    return (values, numbers) if np.count_nonzero(values != VOID) <= most else None
-
-
-@kernel
-def number_codes(codes: Ints, found: Ints, numbers: Labels) -> int:
-    """Give codes numbers in the order they come; return how many there are, at most one more than `found` holds."""
-    n, last = 0, 0
-    for r in range(codes.shape[0]):
-        for c in range(codes.shape[1]):
-            code = codes[r, c]
-            if n == 0 or found[last] != code:
-                last = 0
-                while last < n and found[last] != code:
-                    last += 1
-                if last == len(found):
-                    return n + 1
-                if last == n:
-                    found[n] = code
-                    n += 1
-            numbers[r, c] = last
-    return n
-
-
-def _materials(picture: Picture, values: Ints) -> tuple[Labels, Materials]:
-    """Return the label of each distinct code (ascending), and the materials."""
-    if picture.values.ndim == 2:
-        labels = values.astype(np.int32)
-        names = [f"material {value}" for value in values]
-        return labels, Materials(labels, tuple(names), _colors_of_values(picture, values))
-    bits = 8 * picture.values.dtype.itemsize
-    channels = np.stack([values >> 2 * bits, values >> bits, values], axis=1) & ((1 << bits) - 1)
+def _materials_of_colors(channels: NDArray[Any], bits: int) -> tuple[Labels, Materials]:
     order = dark_to_light(channels)
-    labels = np.empty(len(values), np.int32)
-    labels[order] = np.arange(len(values))
+    labels = np.empty(len(channels), np.int32)
+    labels[order] = np.arange(len(channels))
     names = ["rgb_" + "".join(f"{level:0{bits // 4}x}" for level in channels[k]) for k in order]
     colors = channels[order] >> (bits - 8)
-    return labels, Materials(np.arange(len(values)), tuple(names), colors.astype(np.uint8))
+    return labels, Materials(np.arange(len(channels)), tuple(names), colors.astype(np.uint8))
+
+
+def _materials_of_reals(values: NDArray[Any]) -> tuple[Labels, Materials]:
+    """Number values that are not whole from the smallest, and name them by the value."""
+    order = np.argsort(values, kind="stable")
+    labels = np.empty(len(values), np.int32)
+    labels[order] = np.arange(len(values))
+    names = tuple(f"value {value}" for value in values[order].tolist())
+    return labels, Materials(np.arange(len(values)), names, _hues(np.arange(len(values))))
 
 
 def dark_to_light(colors: NDArray[Any]) -> Ints:
@@ -139,6 +123,11 @@ def _colors_of_values(picture: Picture, values: Ints) -> Bytes:
         grey = values >> (8 * picture.values.dtype.itemsize - 8)
         if len(grey) == 1 or np.diff(grey).min() >= VISIBLE:
             return np.repeat(grey[:, None], 3, axis=1).astype(np.uint8)
+    return _hues(values)
+
+
+def _hues(values: Ints) -> Bytes:
+    """Return colours that hang on the numbers only."""
     # hues by the golden section are far apart for neighbouring numbers; brightness alternates too
     hue = (0.07 + values * 0.6180339887498949) % 1.0
     wheel = np.abs((hue[:, None] * 6.0 + np.array([0.0, 4.0, 2.0])) % 6.0 - 3.0) - 1.0

@@ -47,19 +47,53 @@ class SegmentationOptions:
 
     Parameters
     ----------
-    colors : "auto", "exact", int or sequence of RGB
-        "exact": one material per distinct value or colour. A number: quantised to that many colours. A palette (RGB, 0
-        to 255): each pixel takes the nearest colour of it. "auto": exact where the picture has at most 32 colours or
-        holds labels, else quantised to a number that is chosen from the histogram.
+    colors : "auto", "exact", "regions", int or sequence of RGB
+        "auto": label pictures, told by their pixels, keep a material for each value; raw pictures are divided in
+        classes that are far apart. "exact": one material per distinct value or colour. "regions": one material per
+        connected region of one colour (grain maps). A number: divided in that many classes. A palette (RGB, 0 to
+        255): each pixel takes the nearest colour of it.
+    flatten : "auto" or "off"
+        Whether uneven light is taken out of grey pictures where that separates the classes better.
+    marks : path, Picture or array_like, optional
+        Pixels whose material is known, from which materials grow; see `imgquad_core.picture.marks.marks_of`.
+    learn : bool
+        Whether what looks like the marks for sure is a mark, too (needs scikit-learn).
+    fill_void : int
+        Void clusters (not indexed, NaN, masked, nodata, -1) of at most so many pixels go to the material with the
+        longest common border. 0: void stays void, and is not meshed.
     drop_transparent : bool
         Whether pixels of alpha 0 become `VOID`.
     """
 
     colors: str | int | Sequence[Sequence[int]] = option(
         "auto",
-        "how colours become materials: each its own (exact), quantised to a number of them, the nearest colour of a "
-        "palette, or auto: exact up to 32 colours, else a number that the report states",
+        "how colours become materials: each its own (exact), each connected region of one colour (regions), divided in "
+        "a number of classes, the nearest colour of a palette, or auto: each its own in label pictures, which are told "
+        "by their pixels, else as many classes as are far apart; the report states which",
         kind=object,
+        topic="picture",
+    )
+    flatten: str = option(
+        "auto",
+        "take uneven light out of grey pictures, where that separates the classes better",
+        choices=("auto", "off"),
+        topic="picture",
+    )
+    marks: Any = option(
+        None,
+        "picture of strokes, of the same size, from which materials grow: palette index 0 and clear pixels are not "
+        "marked, each other colour is a material",
+        topic="picture",
+    )
+    learn: bool = option(
+        False, "let a random forest learn from the marks what else is marked for sure (scikit-learn)", topic="picture"
+    )
+    fill_void: int = option(
+        0,
+        "void clusters (not indexed, NaN, masked, nodata, -1) of at most so many pixels go to the material with the "
+        "longest common border; 0: void stays void, and is not meshed",
+        what="a whole number of pixels",
+        least=0,
         topic="picture",
     )
     drop_transparent: bool = option(
@@ -69,12 +103,16 @@ class SegmentationOptions:
     def __post_init__(self) -> None:
         check(self)
         _check_colors(self.colors)
+        if self.marks is not None and self.colors != "auto":
+            raise InputError(f"colors is {self.colors}, but marks name the materials: give one of them")
+        if self.learn and self.marks is None:
+            raise InputError("learn is on, but there are no marks to learn from: give marks")
 
 
 def _check_colors(colors: Any) -> None:
     if isinstance(colors, str):
-        if colors not in ("auto", "exact"):
-            raise InputError(f"colors is '{colors}': give auto, exact, a number of colours or a list of RGB")
+        if colors not in ("auto", "exact", "regions"):
+            raise InputError(f"colors is '{colors}': give auto, exact, regions, a number of colours or a list of RGB")
     elif isinstance(colors, Integral):
         if not _NUMBER.allows(colors):
             raise InputError(f"colors is {colors}: give a number of colours from 1 to 256")

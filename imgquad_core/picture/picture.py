@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,11 @@ class Picture:
     opaque : bool, shape (n_rows, n_cols), optional
         False where the pixel is wholly transparent (alpha 0). None: all are opaque.
     labels : bool
-        Whether `values` are material numbers for sure, however many.
+        Whether the format says that `values` are material numbers; else the pixels are judged.
+    void : bool, shape (n_rows, n_cols), optional
+        Pixels that hold nothing: NaN, infinity, masked, nodata. None: all hold something.
+    names : mapping of int to str, optional
+        Names of material numbers, such as phases; others are named by their number.
     name : str
         What to call the picture in messages.
     """
@@ -35,6 +40,8 @@ class Picture:
     opaque: Flags | None = None
     labels: bool = False
     name: str = "the array"
+    void: Flags | None = None
+    names: Mapping[int, str] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -53,9 +60,9 @@ def picture_of(array: ArrayLike, name: str = "the array") -> Picture:
     Parameters
     ----------
     array : array_like, shape (n_rows, n_cols) or (n_rows, n_cols, 1 to 4)
-        One channel: signed integers, bool and integers of 32 bits or more are material numbers; uint8, uint16 and
-        floats are grey values (`segment` takes them for material numbers where they are few). Two: grey and alpha.
-        Three or four: RGB and perhaps alpha; integers from 0 to 255 or 65535, floats from 0 to 1 or to 255.
+        One channel: material numbers or grey values of any type; `segment` tells them apart. Two: grey and alpha.
+        Three or four: RGB and perhaps alpha; integers from 0 to 255 or 65535, floats from 0 to 1 or to 255. Pixels
+        that a masked array hides, NaN and infinity are void.
     name : str
         What to call it in messages.
 
@@ -67,9 +74,9 @@ def picture_of(array: ArrayLike, name: str = "the array") -> Picture:
     Raises
     ------
     InputError
-        For a stack, no pixels, NaN or infinity, numbers that are no colours, and types that are no numbers.
+        For a stack, no pixels, no finite number, numbers that are no colours, and types that are no numbers.
     """
-    values = np.asarray(array)
+    values = array.data if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
     if values.dtype.kind not in "biuf":
         raise InputError(f"{name} holds values of type {values.dtype}: give integers, floats or bool")
     if values.ndim not in (2, 3) or (values.ndim == 3 and not 1 <= values.shape[2] <= 4):
@@ -79,27 +86,30 @@ def picture_of(array: ArrayLike, name: str = "the array") -> Picture:
         )
     if values.size == 0:
         raise InputError(f"{name} has the shape {values.shape}, no pixels: give at least one")
-    _assert_finite(values, name)
     values = values.astype(values.dtype.newbyteorder("="), copy=False)
+    void = _void_of(array.mask if isinstance(array, np.ma.MaskedArray) else None, values, name)
+    if void is not None:
+        values = values.copy()
+        values[void] = values[~void][0]
     channels = values.shape[2] if values.ndim == 3 else 1
     opaque = values[..., -1] > 0 if channels in (2, 4) else None
     if opaque is not None and opaque.all():
         opaque = None
     if channels >= 3:
-        return Picture(_as_rgb(values[..., :3], name), None, opaque, False, name)
+        return Picture(_as_rgb(values[..., :3], name), None, opaque, name=name, void=void)
     grey = values if values.ndim == 2 else values[..., 0]
-    is_labels = grey.dtype.kind in "bi" or (grey.dtype.kind == "u" and grey.dtype.itemsize > 2)
-    return Picture(grey.astype(np.uint8) if grey.dtype.kind == "b" else grey, None, opaque, is_labels, name)
+    return Picture(grey.astype(np.uint8) if grey.dtype.kind == "b" else grey, None, opaque, name=name, void=void)
 
 
-def _assert_finite(values: NDArray[Any], name: str) -> None:
-    if values.dtype.kind != "f" or np.isfinite(values).all():
-        return
-    place = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
-    raise InputError(
-        f"{name} holds {values[place]} at row {place[0]}, column {place[1]}: replace what is not finite, for instance"
-        " by numpy.nan_to_num, or by -1 in an integer array for pixels that are not meshed"
-    )
+def _void_of(mask: Any, values: NDArray[Any], name: str) -> Flags | None:
+    """Return the pixels with a value that is masked or not finite, None where there are none."""
+    void = np.broadcast_to(np.asarray(False if mask is None else mask), values.shape)
+    if values.dtype.kind == "f":
+        void = void | ~np.isfinite(values)
+    void = void if void.ndim == 2 else void.any(axis=2)
+    if void.all():
+        raise InputError(f"{name} holds no finite number that is not masked: give at least one")
+    return void if void.any() else None
 
 
 def _as_rgb(values: NDArray[Any], name: str) -> NDArray[Any]:

@@ -12,12 +12,8 @@ from scipy.spatial.distance import cdist
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
 from imgquad_core.jit import kernel
 
-#: `auto` tries up to this many classes
-MOST_CLASSES = 12
 #: bits of each channel that the histogram of colours keeps
 BITS = 6
-#: mean squared error below which classes are as good as exact: grey levels (of 256) and CIELAB units
-FLOOR = {1: 1.0, 3: 1.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,13 +175,8 @@ def errors_of(points: Floats, weights: Floats, found: list[Floats]) -> Floats:
     return np.array([(distances2(points, c).min(axis=1) * weights).sum() / weights.sum() for c in found])
 
 
-def best_count(errors: Floats, dimension: int) -> int:
-    """Choose a number of classes from the errors of 1, 2, ...: the largest jump of the inverse error.
+def cielab(levels: Floats) -> Floats:
+    """Return RGB levels, shape (n, 3), 0 to 255, in CIELAB."""
+    from skimage.color import rgb2lab
 
-    Splitting noise or a continuum of shades in k classes lowers the mean squared error as k**(-2/dimension) only, so
-    error**(-dimension/2) grows steadily; it jumps where k comes to the number of classes that are there
-    (Sugar and James 2003, doi:10.1198/016214503000000666). At least 2.
-    """
-    inverse = (errors + FLOOR[dimension]) ** (-dimension / 2)
-    jumps = np.diff(inverse)
-    return int(jumps.argmax()) + 2 if len(jumps) else 1
+    return np.asarray(rgb2lab(levels / 255.0), float)

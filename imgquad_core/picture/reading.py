@@ -38,7 +38,6 @@ def read_picture(path: str | Path, options: ReadOptions | None = None) -> Pictur
     Picture
         Grey values and labels as they are stored (8, 16, 32 bit or float; a small range that the format stretches is
         put back: 2 and 4 bit PNG, PGM with a maximum other than 255), palette indices with their palette, or RGB.
-        Integers of one channel in NPY, and signed or 32 bit ones in TIFF, are material numbers however many.
         CMYK, YCbCr and the like are turned into RGB. Alpha 0 becomes not opaque. 16 bit RGB is kept from TIFF; of a
         PNG, Pillow gives the upper 8 bits.
 
@@ -111,8 +110,7 @@ def _read_npy(path: Path, options: ReadOptions) -> Picture:
         array = array[_chosen_frame(path, len(array), options)]
     if array.ndim >= 2:
         _assert_pixels(path, array.shape[1], array.shape[0], options)
-    picture = picture_of(np.array(array), str(path))
-    return replace(picture, labels=picture.is_grey and array.dtype.kind in "biu")
+    return picture_of(np.array(array), str(path))
 
 
 def _read_tiff(path: Path, options: ReadOptions) -> Picture:

@@ -1,40 +1,33 @@
-"""Any picture becomes labels: exact colours where they are few, else quantised ones."""
+"""Any picture becomes labels: values that are materials are kept, shades are divided in classes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
+from imgquad_core.arrays import Flags, Floats
 from imgquad_core.errors import InputError
-from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage, Materials
 
-from .blends import find_rims, relabel_rims
-from .exact_colours import dark_to_light, exact_labels
+from .classes import APART
+from .exact_colours import exact_labels, with_minus_one
+from .grain_maps import LEFT_OVER, SHARE, cores_of, regions_of
+from .kinds import Kind, kind_of
+from .levels import NOISY, levels_of
+from .marks import grow_from, marks_of
 from .options import SegmentationOptions
 from .picture import Picture, picture_of
-from .quantisation import (
-    MOST_CLASSES,
-    Histogram,
-    best_count,
-    distances2,
-    errors_of,
-    histogram_of,
-    kmeans_centres,
-    otsu_centres,
-)
+from .raw import Found, find_classes, find_nearest
+from .voids import fill_void, void_clusters
 
-#: `auto` takes a picture with no more colours than this at its word
-MOST_EXACT = 32
 #: no limit
 ANY_NUMBER = 1 << 40
-#: noise (standard deviation, in levels of 256) from which a picture is median filtered
-NOISY = 0.5
-Levels = Bytes
+#: void clusters of at most so many pixels are told, for they may be faults of the measurement
+SPECKS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,32 +39,37 @@ class Segmentation:
     image : LabelImage
         The labels.
     quantised : bool
-        Whether colours were quantised; the default of noise removal hangs on it.
+        Whether shades were divided in classes; the default of noise removal hangs on it.
     method : str
         In words: "exact", "multi-Otsu", "k-means in CIELAB" or "nearest of the palette".
     noise : float
         Standard deviation of the noise that was found, in levels of 256 (0 where exact).
-    smoothed : bool
-        Whether the picture was median filtered for it.
     rims : int
         Blended pixels that were kept out of a third material's hands.
+    details : str
+        Why and how, in words.
+    warnings : tuple of str
+        Where the choice is weak: what else may be meant, and the option for it.
     """
 
     image: LabelImage
     quantised: bool
     method: str = "exact"
     noise: float = 0.0
-    smoothed: bool = False
     rims: int = 0
+    details: str = ""
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def smoothed(self) -> bool:
+        """Whether the picture was filtered for its noise."""
+        return self.noise >= NOISY
 
     @property
     def note(self) -> str:
         """What was chosen, in one line."""
-        n = len(self.image.materials.labels)
-        if not self.quantised:
-            return f"{n} materials, exact"
-        filtered = f", noise {self.noise:.1f} of 255 median filtered" if self.smoothed else ""
-        return f"{n} materials by {self.method}{filtered}, {self.rims} blended pixels"
+        how = f"by {self.method}" if self.quantised else self.method
+        return f"{len(self.image.materials.labels)} materials, {how}{self.details}"
 
 
 def segment(picture: Picture | NDArray[Any] | LabelImage, options: SegmentationOptions | None = None) -> LabelImage:
@@ -82,7 +80,7 @@ def segment(picture: Picture | NDArray[Any] | LabelImage, options: SegmentationO
     picture : Picture, array_like or LabelImage
         What `read_picture` gave, or an array as for `picture_of`. A `LabelImage` is returned as it is.
     options : SegmentationOptions, optional
-        How many colours, and what becomes of transparent pixels.
+        How many colours, and what becomes of transparent and void pixels.
 
     Returns
     -------
@@ -92,22 +90,25 @@ def segment(picture: Picture | NDArray[Any] | LabelImage, options: SegmentationO
     Raises
     ------
     InputError
-        For labels that cannot be material numbers (below -1 or above 2**31 - 1; -1 is `VOID`), `exact` on greys that
-        are not whole numbers, a number of colours for labels, a picture that is wholly transparent.
+        For labels that cannot be material numbers (below -1 or above 2**31 - 1; -1 is `VOID`), a number of colours
+        for what its format calls labels, a picture that is wholly transparent.
 
     Notes
     -----
-    Numbers: palette indices, labels and few grey values are kept (named "material 3"). Colours, exact or quantised,
-    are numbered 0, 1, 2, ... from dark to light (299 R + 587 G + 114 B, then R, G, B) and named "rgb_ff8000", or by
-    their grey "grey_87". Colours of a given palette keep their place in it.
+    *Labels or not*: see `imgquad_core.picture.kinds.kind_of`. Numbers: palette indices and labels are kept (named
+    "material 3"); values that are not whole are numbered from the smallest. Colours, exact or not, are numbered 0, 1,
+    2, ... from dark to light (299 R + 587 G + 114 B, then R, G, B) and named "rgb_ff8000", or by their grey "grey_87".
+    Colours of a given palette keep their place in it. Colours of a label picture that occur at rims
+    only, lonely and more than the others, go to one of their two sides.
 
-    Quantising: a noisy picture (standard deviation of 0.5 levels or more, found from its second differences) is median
-    filtered, 3 x 3 twice, which keeps edges and lines of two pixels, but not thinner ones. Rims of anti-aliasing and
-    blur, up to 4 pixels to each side, are not counted in the histogram and never become a third material: each goes to
-    one of the two materials beside it (see `.blends`). Grey is split by multi-Otsu, colours by k-means in
-    CIELAB; `auto` chooses 2 to 12 classes by the largest jump of the inverse error (`quantisation.best_count`).
-    Labels of a noisy picture become the commonest of their 3 x 3 pixels. Nothing is random: the same picture gives the
-    same labels.
+    *Raw pictures*: noise (its standard deviation is found from second differences) is taken away by total variation.
+    Constant values that fill a part of the picture are classes of their own. Classes are judged by the pixels that
+    are neither rims (blends of their two sides, see `imgquad_core.picture.blends`) nor on slopes: grey is divided by
+    multi-Otsu, colours by k-means in CIELAB, in the largest number of classes that are four pooled standard
+    deviations apart; in two if they are 2.7 apart, else there is one. What lies far outside the darkest and brightest
+    class, connected, is a class too. Uneven light is a cubic surface, which is taken out where that separates the
+    classes by a quarter more. Then each pixel takes the nearest class, rims one of their sides, and in noisy pictures
+    the commonest of 3 x 3 pixels. Nothing is random: the same picture gives the same labels.
     """
     return segment_picture(picture, options).image
 
@@ -120,165 +121,150 @@ def segment_picture(
     if isinstance(picture, LabelImage):
         return Segmentation(picture, quantised=False)
     picture = picture if isinstance(picture, Picture) else picture_of(picture)
-    void = None
-    if options.drop_transparent and picture.opaque is not None:
-        void = ~picture.opaque
-        if void.all():
-            raise InputError(f"{picture.name} is wholly transparent: keep transparent pixels (drop_transparent=False)")
-    if picture.labels and options.colors not in ("auto", "exact"):
-        raise InputError(f"colors is {options.colors}, but {picture.name} holds labels: give auto or exact")
-    most = _most_exact(picture, options)
-    exact = exact_labels(picture, most, must=options.colors == "exact", void=void) if most else None
-    return Segmentation(exact, quantised=False) if exact else _quantised(picture, options, void)
+    void = _void_of(picture, options)
+    return _void_told(_found(picture, options, void), options)
 
 
-def _most_exact(picture: Picture, options: SegmentationOptions) -> int:
-    """Return up to how many distinct values the picture is taken as it is."""
-    if isinstance(options.colors, str):
-        return MOST_EXACT if options.colors == "auto" and not picture.labels else ANY_NUMBER
-    return int(options.colors) if isinstance(options.colors, (int, np.integer)) else 0
+def _found(picture: Picture, options: SegmentationOptions, void: Flags | None) -> Segmentation:
+    """Find the materials by the way that the options or the picture ask for."""
+    colors = options.colors
+    if options.marks is not None:
+        return _grown(picture, options, void)
+    if picture.labels and colors not in ("auto", "exact"):
+        raise InputError(f"colors is {colors}, but {picture.name} holds labels: give auto or exact")
+    if colors == "auto":
+        kind = kind_of(picture, with_minus_one(picture.values, void))
+        return _kept(picture, kind, void) if kind.is_labels else _divided(picture, options, void, kind)
+    if colors == "regions":
+        image = regions_of(levels_of(picture, void))
+        return Segmentation(image, False, "regions of one colour")
+    if isinstance(colors, (str, int, np.integer)):
+        found = exact_labels(picture, ANY_NUMBER if isinstance(colors, str) else int(colors), void)
+        return Segmentation(found.image, False) if found else _divided(picture, options, void)
+    return _nearest(picture, np.rint(np.array(colors, float)), void)
 
 
-def _quantised(picture: Picture, options: SegmentationOptions, void: Flags | None) -> Segmentation:
-    levels, low, step = _levels(picture, in_color=not isinstance(options.colors, (str, int, np.integer)))
-    noise = _noise(levels)
-    if noise >= NOISY:
-        levels = _median_filtered(levels)
-    rims = find_rims(levels, contrast=16.0 + 2.0 * noise)
-    counted = ~rims if void is None else ~(rims | void)
-    if not counted.any():
-        counted = ~counted if void is None else ~void
-    histogram = histogram_of(levels, counted)
-    classes = _classes(histogram, options)
-    labels = histogram.spread(classes.of_bins)
-    relabel_rims(levels, rims, labels, classes.means)
-    if noise >= NOISY:
-        labels = commonest_around(labels)
+def _void_of(picture: Picture, options: SegmentationOptions) -> Flags | None:
+    """Return the pixels that hold nothing or are transparent, None where there are none."""
+    if not options.drop_transparent or picture.opaque is None:
+        return picture.void
+    void = ~picture.opaque if picture.void is None else ~picture.opaque | picture.void
+    if void.all():
+        raise InputError(f"{picture.name} is wholly transparent: keep transparent pixels (drop_transparent=False)")
+    return void
+
+
+def _grown(picture: Picture, options: SegmentationOptions, void: Flags | None) -> Segmentation:
+    """Let materials grow from marks."""
+    marks = marks_of(options.marks, picture.shape)
+    share = np.mean(marks.labels != VOID)
+    details = f", from {share:.2%} of the pixels" + (", and from what looks like them" if options.learn else "")
+    return Segmentation(
+        grow_from(levels_of(picture, void), marks, options.learn), False, "grown from marks", details=details
+    )
+
+
+def _kept(picture: Picture, kind: Kind, void: Flags | None) -> Segmentation:
+    """Take each value for a material, but for the blends at rims."""
+    found = exact_labels(picture, ANY_NUMBER, void, with_blends=picture.labels)
+    assert found is not None
+    details = f": {kind.reason}"
+    if found.blends:
+        details += f"; {found.blends} blended colours of rims went to their sides"
+    return Segmentation(found.image, found.blends > 0, details=details, warnings=_doubts(kind))
+
+
+def _doubts(kind: Kind) -> tuple[str, ...]:
+    if kind.doubt is None:
+        return ()
+    taken, other, option = (
+        ("labels, each value a material", "shades", "give the number of materials (colors=N)")
+        if kind.is_labels
+        else ("shades", "labels", 'give colors="exact"')
+    )
+    return (f"taken for {taken} ({kind.doubt}): if it holds {other}, {option}",)
+
+
+def _divided(
+    picture: Picture, options: SegmentationOptions, void: Flags | None, kind: Kind | None = None
+) -> Segmentation:
+    """Divide a raw picture in classes: so many as are far apart, or the number asked for (`kind` is None)."""
+    number = None if kind is not None else int(options.colors)  # type: ignore[arg-type]
+    found = find_classes(levels_of(picture, void), number, options.flatten == "auto")
+    warnings = () if kind is None else _doubts(kind) + _overlap(found) + _grains(found)
+    return _told(found, void, warnings)
+
+
+def _nearest(picture: Picture, palette: Floats, void: Flags | None) -> Segmentation:
+    """Give each pixel the nearest colour of a palette."""
+    return _told(find_nearest(levels_of(picture, void, in_color=True), palette), void, ())
+
+
+def _told(found: Found, void: Flags | None, warnings: tuple[str, ...]) -> Segmentation:
+    labels = found.labels
     if void is not None:
         labels[void] = VOID
-    image = LabelImage(labels, _materials(classes.means, low, step))
-    return Segmentation(image, True, classes.method, noise, noise >= NOISY, int(np.count_nonzero(rims)))
+    image = LabelImage(labels, _materials(found))
+    return Segmentation(image, True, found.method, found.noise, found.rims, _details(found), warnings)
 
 
-def _levels(picture: Picture, in_color: bool) -> tuple[Levels, float, float]:
-    """Return levels 0 to 255 (rows, columns, 1 or 3), and for grey the value of level 0 and the step to the next."""
-    values = picture.values if picture.palette is None else picture.palette[picture.values]
-    if values.ndim == 3:
-        rgb = values if values.dtype == np.uint8 else (values >> 8).astype(np.uint8)
-        if in_color or (rgb[..., 0] != rgb[..., 1]).any() or (rgb[..., 0] != rgb[..., 2]).any():
-            return np.ascontiguousarray(rgb), 0.0, 1.0
-        values = rgb[..., 0]
-    grey, low, step = values, 0.0, 1.0
-    if values.dtype != np.uint8:
-        # a few outliers must not take the range
-        low, high = np.quantile(values, (0.0001, 0.9999)).tolist()
-        step = (high - low) / 255.0 or 1.0
-        grey = np.rint(np.clip((values - low) / step, 0.0, 255.0)).astype(np.uint8)
-    return np.repeat(grey[..., None], 3 if in_color else 1, axis=2), low, step
+def _grains(found: Found) -> tuple[str, ...]:
+    """Suggest a material a region, where each region has one colour, but there are more colours than classes."""
+    if found.levels.is_grey or found.left_over <= LEFT_OVER:
+        return ()
+    cores = cores_of(found.smooth.plane, found.noise, found.levels.void)
+    if cores.even < SHARE:
+        return ()
+    return (f'it may be a map of {len(cores.means)} grains: colors="regions" makes each a material',)
 
 
-def _noise(levels: Levels) -> float:
-    """Return the standard deviation of white noise, from the median of second differences both ways.
-
-    A difference as [[1, -2, 1], [-2, 4, -2], [1, -2, 1]] is blind to even slopes and to straight edges along rows and
-    columns (Immerkaer 1996, doi:10.1006/cviu.1996.0060). At most about 10**6 pixels are looked at.
-    """
-    if min(levels.shape[:2]) < 3:
-        return 0.0
-    every = max(1, levels[..., 0].size // 1_000_000)
-    above, here, below = (levels[k : levels.shape[0] - 2 + k : every].astype(np.int16) for k in range(3))
-    down = above - 2 * here + below
-    both = down[:, :-2] - 2 * down[:, 1:-1] + down[:, 2:]
-    return float(np.median(np.abs(both), axis=(0, 1)).max() / 6.0 / 0.6745)
+def _overlap(found: Found) -> tuple[str, ...]:
+    if found.separation >= APART:
+        return ()
+    what = "the classes overlap" if len(found.means) - found.constants - found.tails > 1 else "no classes stand out"
+    return (f"{what} ({found.separation:.1f} of {APART:.0f}): give their number (colors=N) or marks",)
 
 
-def _median_filtered(levels: Levels) -> Levels:
-    from scipy.ndimage import median_filter
-
-    # 3 x 3 twice spares lines of two pixels, which 5 x 5 loses, and takes out as much noise
-    filtered = levels
-    for _ in range(2):
-        filtered = np.stack([median_filter(filtered[..., k], 3) for k in range(levels.shape[2])], axis=2)
-    return filtered
-
-
-class Classes(NamedTuple):
-    """A histogram divided in materials."""
-
-    of_bins: Labels  #: the material of each bin
-    means: Floats  #: (n_materials, n_channels), levels
-    method: str
+def _details(found: Found) -> str:
+    """Say how classes were found."""
+    parts = []
+    if np.isfinite(found.separation):
+        parts.append(f"{found.separation:.1f} standard deviations apart")
+    if found.constants:
+        parts.append(f"{found.constants} of them constant")
+    if found.tails:
+        parts.append(f"{found.tails} of them rare")
+    if found.noise >= NOISY:
+        parts.append(f"noise {found.noise:.1f} of 255 filtered")
+    if found.shaded:
+        parts.append("uneven light taken out")
+    return "".join(f", {part}" for part in parts) + f", {found.rims} blended pixels"
 
 
-def _classes(histogram: Histogram, options: SegmentationOptions) -> Classes:
-    """Divide a histogram by the method that suits it."""
-    is_grey = histogram.levels.shape[1] == 1
-    points = histogram.levels if is_grey else _cielab(histogram.levels)
-    if not isinstance(options.colors, (str, int, np.integer)):
-        palette = np.rint(np.array(options.colors, float))
-        nearest = distances2(points, _cielab(palette)).argmin(axis=1)
-        return Classes(nearest.astype(np.int32), palette, "nearest of the palette")
-    most = MOST_CLASSES if options.colors == "auto" else int(options.colors)
-    found = otsu_centres(histogram.weights, most) if is_grey else kmeans_centres(points, histogram.weights, most)
-    if options.colors == "auto":
-        found = found[: best_count(errors_of(points, histogram.weights, found), points.shape[1])]
-    nearest = distances2(points, found[-1]).argmin(axis=1)
-    means = _means(histogram, nearest, len(found[-1]))
-    order = dark_to_light(np.rint(means if means.shape[1] == 3 else np.repeat(means, 3, axis=1)))
-    place = np.empty(len(order), np.int32)
-    place[order] = np.arange(len(order))
-    return Classes(place[nearest], means[order], "multi-Otsu" if is_grey else "k-means in CIELAB")
+def _void_told(found: Segmentation, options: SegmentationOptions) -> Segmentation:
+    """Fill small void clusters, and say what is void."""
+    n_void = int(np.count_nonzero(found.image.labels == VOID))
+    if n_void == 0:
+        return found
+    image = fill_void(found.image, int(options.fill_void))
+    left = int(np.count_nonzero(image.labels == VOID))
+    details = f"; {n_void} void pixels" + (f", {n_void - left} of them filled from around" if left < n_void else "")
+    _, sizes = void_clusters(image.labels)
+    specks = int(np.count_nonzero((sizes > 0) & (sizes <= SPECKS)))
+    warnings: tuple[str, ...] = ()
+    if specks and options.fill_void < SPECKS:
+        warnings = (f"{specks} void specks of at most {SPECKS} pixels are holes: fill them with fill_void={SPECKS}",)
+    return replace(found, image=image, details=found.details + details, warnings=found.warnings + warnings)
 
 
-def _means(histogram: Histogram, nearest: Ints, n: int) -> Floats:
-    """Return the mean levels of each class."""
-    mass = np.bincount(nearest, histogram.weights, n)
-    sums = [np.bincount(nearest, histogram.weights * channel, n) for channel in histogram.levels.T]
-    return np.asarray(np.stack(sums, axis=1) / np.where(mass > 0, mass, 1.0)[:, None])
-
-
-def _cielab(levels: Floats) -> Floats:
-    from skimage.color import rgb2lab
-
-    return np.asarray(rgb2lab(levels / 255.0), float)
-
-
-@kernel
-def commonest_around(labels: Labels) -> Labels:
-    """Return the commonest label of the 3 x 3 pixels around each, its own among equals, else the first in order."""
-    rows, cols = labels.shape
-    found = labels.copy()
-    for r in range(rows):
-        for c in range(cols):
-            top, left, bottom, right = max(r - 1, 0), max(c - 1, 0), min(r + 2, rows), min(c + 2, cols)
-            most = count_in(labels, top, left, bottom, right, labels[r, c])
-            if 2 * most > (bottom - top) * (right - left):
-                continue
-            for i in range(top, bottom):
-                for j in range(left, right):
-                    n = count_in(labels, top, left, bottom, right, labels[i, j])
-                    if n > most:
-                        found[r, c], most = labels[i, j], n
-    return found
-
-
-@verb
-def count_in(labels: Labels, top: int, left: int, bottom: int, right: int, label: int) -> int:
-    """Return how often `label` occurs in a window."""
-    n = 0
-    for i in range(top, bottom):
-        for j in range(left, right):
-            n += labels[i, j] == label
-    return n
-
-
-def _materials(means: Floats, low: float, step: float) -> Materials:
+def _materials(found: Found) -> Materials:
     """Name materials 0, 1, ... by their colour; a name that has been given gets the number behind it."""
-    colors = np.rint(means if means.shape[1] == 3 else np.repeat(means, 3, axis=1)).astype(np.uint8)
+    means, levels = found.means, found.levels
+    colors = np.clip(np.rint(means if means.shape[1] == 3 else np.repeat(means, 3, axis=1)), 0, 255).astype(np.uint8)
     if means.shape[1] == 3:
         names = ["rgb_" + "".join(f"{level:02x}" for level in color) for color in colors]
     else:
-        digits = ".0f" if step >= 1.0 else ".6g"
-        names = [f"grey_{low + step * level:{digits}}" for level in means[:, 0]]
+        digits = ".0f" if levels.step >= 1.0 else ".6g"
+        names = [f"grey_{levels.value_of(level):{digits}}" for level in means[:, 0]]
     unique = tuple(name if name not in names[:k] else f"{name}_{k}" for k, name in enumerate(names))
     return Materials(np.arange(len(names)), unique, colors)

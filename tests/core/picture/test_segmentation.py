@@ -15,9 +15,10 @@ from scipy.spatial import cKDTree
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID
 from imgquad_core.picture.blends import find_rims
+from imgquad_core.picture.classes import classes_of
 from imgquad_core.picture.noise import automatic_limits, remove_noise
 from imgquad_core.picture.picture import Picture, picture_of
-from imgquad_core.picture.quantisation import best_count, errors_of, kmeans_centres, otsu_centres
+from imgquad_core.picture.quantisation import Histogram, errors_of, kmeans_centres, otsu_centres
 from imgquad_core.picture.reading import read_picture
 from imgquad_core.picture.segmentation import SegmentationOptions, segment, segment_picture
 
@@ -323,18 +324,15 @@ def test_kmeans_is_as_good_as_the_best_of_many_random_starts() -> None:
 
 @pytest.mark.parametrize("n", [2, 3, 5, 8])
 @pytest.mark.parametrize("dimension", [1, 3])
-def test_auto_finds_how_many_clusters_there_are(n: int, dimension: int) -> None:
+def test_classes_are_as_many_as_there_are_clusters(n: int, dimension: int) -> None:
     random = np.random.default_rng(n)
-    middles = np.linspace(20, 230, n)[:, None] if dimension == 1 else random.random((n, 3)) * 100
-    points = np.concatenate([random.normal(m, 3.0, (600, dimension)) for m in middles])
-    weights = np.ones(len(points))
-    if dimension == 1:
-        weights = np.bincount(np.rint(points[:, 0]).clip(0, 255).astype(int), minlength=256).astype(float)
-        points = np.arange(256.0)[:, None]
-        found = otsu_centres(weights, 12)
-    else:
-        found = kmeans_centres(points, weights, 12)
-    assert best_count(errors_of(points, weights, found), dimension) == n
+    middles = np.linspace(20, 230, n)[:, None] if dimension == 1 else 50 + random.permutation(n)[:, None] * (20, 0, 0)
+    points = np.concatenate([random.normal(m, 2.5, (600, dimension)) for m in middles]).clip(0, 255)
+    levels, weights = np.unique(np.rint(points), axis=0, return_counts=True)
+    empty = np.zeros((1, 1), np.int32)
+    found = classes_of(Histogram(empty, empty.ravel(), levels, weights.astype(float)))
+    assert len(found.means) == n
+    assert found.separation > 4
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,263 @@
+"""Raw pictures: from shades and noise to classes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
+from imgquad_core.jit import kernel, verb
+
+from .blends import find_rims, relabel_rims
+from .classes import Classes, classes_of
+from .constants import Constant, constants_of
+from .exact_colours import dark_to_light
+from .levels import NOISY, Levels, cubic, filtered_strips, noise_of, squared_gradient
+from .quantisation import cielab, distances2, histogram_of
+from .shading import shade_of
+from .tails import tails_of
+
+#: least contrast of a rim: levels, and at most so many more for noise
+RIM, RIM_OF_NOISE = 16.0, 16.0
+#: pixels of larger gradient (levels, or standard deviations of the noise) are on a slope; three channels add up
+SLOPE, OF_COLOUR = 2.0, 1.7
+#: shading is taken out if it ranges over more standard deviations of the noise, and separates classes better so much
+SHADED, BETTER = 2.0, 1.25
+#: a pixel so far from another class towards its own keeps it, whatever is around it
+CLEAR = 0.7
+
+
+class Smooth(NamedTuple):
+    """A picture without noise."""
+
+    plane: Bytes  #: (n_rows, n_cols, n_channels)
+    rims: Flags  #: blends of two sides
+    support: Flags  #: neither rims nor on slopes: what classes are judged by
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Classes of a raw picture, and how they were found.
+
+    Parameters
+    ----------
+    labels : int32, shape (n_rows, n_cols)
+        Number of each pixel's class.
+    means : float64, shape (n_classes, 1 or 3)
+        Mean levels of the classes; grey ones and colours from dark to light.
+    levels : Levels
+        What level means which value.
+    method : str
+        In words.
+    noise : float
+        Standard deviation of the noise, in levels.
+    rims : int
+        Blended pixels that were given to one of their sides.
+    separation : float
+        Least distance of two classes in pooled standard deviations; inf if that was not looked at.
+    left_over : float
+        Root of the mean squared distance of the pixels' colours from their classes: levels, CIELAB units of colours.
+    smooth : Smooth
+        The picture without noise.
+    constants, tails : int
+        How many classes are constant values, and rare phases outside all others.
+    """
+
+    labels: Labels
+    means: Floats
+    levels: Levels
+    method: str
+    noise: float
+    rims: int
+    smooth: Smooth
+    separation: float = np.inf
+    left_over: float = 0.0
+    constants: int = 0
+    tails: int = 0
+
+    @property
+    def shaded(self) -> bool:
+        """Whether shading was taken out."""
+        return self.levels.shade is not None
+
+
+class Choice(NamedTuple):
+    """Classes of the pixels that are no constants."""
+
+    levels: Levels
+    smooth: Smooth
+    classes: Classes
+
+
+def find_classes(levels: Levels, number: int | None = None, flatten: bool = True) -> Found:
+    """Find the classes of a raw picture: as many as are far apart, or the number given.
+
+    Parameters
+    ----------
+    levels : Levels
+        Of the picture.
+    number : int, optional
+        How many.
+    flatten : bool
+        Whether shading may be taken out of grey pictures.
+
+    Notes
+    -----
+    See `imgquad_core.picture.segmentation.segment` for the steps.
+    """
+    noise = noise_of(levels)
+    constants = constants_of(levels, noise) if levels.is_grey else []
+    constants = constants if number is None else constants[: number - 1]
+    fixed = _united(constants)
+    if fixed is not None:
+        noise = noise_of(levels, fixed)
+    wanted = None if number is None else number - len(constants)
+    choice = _chosen(levels, smoothed(levels, noise, fixed), wanted)
+    if flatten and levels.is_grey and not constants:
+        choice = _flattened(choice, noise, wanted)
+    means = choice.classes.means
+    tails: list[float] = []
+    if number is None and levels.is_grey:
+        tails = tails_of(choice.smooth.plane[..., 0], choice.smooth.support, np.sort(means[:, 0]), noise)
+    means = np.concatenate([means, np.reshape(tails, (-1, 1))]) if tails else means
+    means = means[_by_light(means)]
+    return _labelled(choice, means, constants, noise, len(tails))
+
+
+def find_nearest(levels: Levels, palette: Floats) -> Found:
+    """Give each pixel the nearest of given colours, shape (n, 3), in CIELAB."""
+    noise = noise_of(levels)
+    smooth = smoothed(levels, noise, None)
+    classes = Classes(palette, np.zeros(0, np.int32), np.inf, 0.0, "nearest of the palette")
+    return _labelled(Choice(levels, smooth, classes), palette, [], noise, 0)
+
+
+def smoothed(levels: Levels, noise: float, without: Flags | None) -> Smooth:
+    """Take noise away and tell rims and slopes from what is flat; pixels `without` and void are no support."""
+    plane = np.empty((*levels.shape, levels.values.shape[2]), np.uint8)
+    gentle = np.empty(levels.shape, np.bool_)
+    bound = max(SLOPE, noise) * (1.0 if levels.is_grey else OF_COLOUR)
+    for strip in filtered_strips(levels, noise):
+        plane[strip.place] = np.rint(np.clip(strip.shades[strip.own], 0.0, 255.0))
+        gentle[strip.place] = squared_gradient(strip.shades)[strip.own] <= bound**2
+    rims = find_rims(plane, RIM + min(noise, RIM_OF_NOISE))
+    support = gentle & ~rims
+    for pixels in (levels.void, without):
+        if pixels is not None:
+            support &= ~pixels
+    if not support.any():  # noise or slopes all over
+        support = np.ones(levels.shape, np.bool_) if levels.void is None else ~levels.void
+    return Smooth(plane, rims, support)
+
+
+def _united(constants: list[Constant]) -> Flags | None:
+    return np.logical_or.reduce([c.pixels for c in constants]) if constants else None
+
+
+def _chosen(levels: Levels, smooth: Smooth, number: int | None) -> Choice:
+    return Choice(levels, smooth, classes_of(histogram_of(smooth.plane, smooth.support), number))
+
+
+def _flattened(choice: Choice, noise: float, number: int | None) -> Choice:
+    """Return the choice without shading, where that separates no fewer classes clearly better."""
+    shade = shade_of(choice.levels, choice.smooth.plane[..., 0], noise, choice.levels.void)
+    if shade is None:
+        return choice
+    rows, cols = choice.levels.shape
+    surface = cubic((rows, cols), np.arange(0, rows, 4)[:, None], np.arange(0, cols, 4)[None], shade)
+    if np.ptp(surface) <= SHADED * noise:
+        return choice
+    flat = choice.levels.without_shade(shade)
+    other = _chosen(flat, smoothed(flat, noise, None), number)
+    if len(other.classes.means) < len(choice.classes.means):
+        return choice
+    before = choice.classes.separation
+    return other if other.classes.separation > BETTER * before else choice
+
+
+def _by_light(means: Floats) -> Ints:
+    """Return the order of classes from dark to light."""
+    return dark_to_light(np.rint(means if means.shape[1] == 3 else np.repeat(means, 3, axis=1)))
+
+
+def _labelled(choice: Choice, means: Floats, constants: list[Constant], noise: float, tails: int) -> Found:
+    """Give each pixel its nearest class, rims one of their sides, and noise what is around it."""
+    smooth = choice.smooth
+    histogram = histogram_of(smooth.plane, smooth.support)
+    in_color = means.shape[1] == 3
+    points, centres = (cielab(histogram.levels), cielab(means)) if in_color else (histogram.levels, means)
+    labels = histogram.spread(distances2(points, centres).argmin(axis=1).astype(np.int32))
+    means = np.concatenate([means, *([[c.level]] for c in constants)])
+    for k, constant in enumerate(constants):
+        labels[constant.pixels] = len(means) - len(constants) + k
+    if len(means) > 2:
+        relabel_rims(smooth.plane, smooth.rims, labels, means)
+        for k, constant in enumerate(constants):
+            labels[constant.pixels] = len(means) - len(constants) + k
+    if noise >= NOISY:
+        labels = commonest_around(labels, smooth.plane, means)
+    if constants:
+        order = _by_light(means)
+        place = np.empty(len(order), np.int32)
+        place[order] = np.arange(len(order))
+        labels, means = place[labels], means[order]
+    return Found(
+        labels=labels,
+        means=means,
+        levels=choice.levels,
+        method=choice.classes.method,
+        noise=noise,
+        rims=int(np.count_nonzero(smooth.rims)),
+        smooth=smooth,
+        separation=choice.classes.separation,
+        left_over=choice.classes.left_over,
+        constants=len(constants),
+        tails=tails,
+    )
+
+
+@kernel
+def commonest_around(labels: Labels, plane: Bytes, means: Floats) -> Labels:
+    """Return the commonest label of the 3 x 3 pixels around each, its own among equals, else the first in order.
+
+    A pixel that is clearly of its own class stays: it may be of a line one pixel wide.
+    """
+    rows, cols = labels.shape
+    found = labels.copy()
+    for r in range(rows):
+        for c in range(cols):
+            top, left, bottom, right = max(r - 1, 0), max(c - 1, 0), min(r + 2, rows), min(c + 2, cols)
+            most = count_in(labels, top, left, bottom, right, labels[r, c])
+            if 2 * most > (bottom - top) * (right - left):
+                continue
+            for i in range(top, bottom):
+                for j in range(left, right):
+                    n = count_in(labels, top, left, bottom, right, labels[i, j])
+                    if n > most:
+                        found[r, c], most = labels[i, j], n
+            if found[r, c] != labels[r, c] and is_clear(plane, means, r, c, labels[r, c], found[r, c]):
+                found[r, c] = labels[r, c]
+    return found
+
+
+@verb
+def is_clear(plane: Bytes, means: Floats, r: int, c: int, own: int, other: int) -> bool:
+    """Tell whether a pixel lies at least `CLEAR` of the way from the class `other` to its own."""
+    along, whole = 0.0, 0.0
+    for k in range(plane.shape[2]):
+        step = means[own, k] - means[other, k]
+        along += (float(plane[r, c, k]) - means[other, k]) * step
+        whole += step * step
+    return along >= CLEAR * whole
+
+
+@verb
+def count_in(labels: Labels, top: int, left: int, bottom: int, right: int, label: int) -> int:
+    """Return how often `label` occurs in a window."""
+    n = 0
+    for i in range(top, bottom):
+        for j in range(left, right):
+            n += labels[i, j] == label
+    return n
