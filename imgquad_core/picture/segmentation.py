@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -178,9 +177,9 @@ def _doubts(kind: Kind) -> tuple[str, ...]:
     if kind.doubt is None:
         return ()
     taken, other, option = (
-        ("labels, each value a material", "shades", "give the number of materials (colors=N)")
+        ("labels, each value a material", "shades", "give their number (colors = N)")
         if kind.is_labels
-        else ("shades", "labels", 'give colors="exact"')
+        else ("shades", "labels", "give colors = exact")
     )
     return (f"taken for {taken} ({kind.doubt}): if it holds {other}, {option}",)
 
@@ -215,14 +214,14 @@ def _grains(found: Found) -> tuple[str, ...]:
     cores = cores_of(found.smooth.plane, found.noise, found.levels.void)
     if cores.even < SHARE:
         return ()
-    return (f'it may be a map of {len(cores.means)} grains: colors="regions" makes each a material',)
+    return (f"it may be a map of {len(cores.means)} grains: colors = regions makes each a material",)
 
 
 def _overlap(found: Found) -> tuple[str, ...]:
     if found.separation >= APART:
         return ()
     what = "the classes overlap" if len(found.means) - found.constants - found.tails > 1 else "no classes stand out"
-    return (f"{what} ({found.separation:.1f} of {APART:.0f}): give their number (colors=N) or marks",)
+    return (f"{what} ({found.separation:.1f} of {APART:.0f}): give their number (colors = N) or marks",)
 
 
 def _details(found: Found) -> str:
@@ -253,7 +252,7 @@ def _void_told(found: Segmentation, options: SegmentationOptions) -> Segmentatio
     specks = int(np.count_nonzero((sizes > 0) & (sizes <= SPECKS)))
     warnings: tuple[str, ...] = ()
     if specks and options.fill_void < SPECKS:
-        warnings = (f"{specks} void specks of at most {SPECKS} pixels are holes: fill them with fill_void={SPECKS}",)
+        warnings = (f"{specks} void specks of at most {SPECKS} pixels are holes: fill them by fill_void = {SPECKS}",)
     return replace(found, image=image, details=found.details + details, warnings=found.warnings + warnings)
 
 

@@ -80,13 +80,13 @@ def sides(text: str) -> float | tuple[float, float]:
 
 def colors(text: str) -> str | int | list[tuple[int, int, int]]:
     """Return what --colors asks for."""
-    if text in ("auto", "exact"):
+    if text in ("auto", "exact", "regions"):
         return text
     if text.isdigit():
         return int(text)
     parts = [part.strip() for part in text.split(",")]
     if not all(re.fullmatch("#[0-9a-fA-F]{6}", part) for part in parts):
-        raise argparse.ArgumentTypeError(f"'{text}' is none of: auto, exact, a number, '#rrggbb,#rrggbb,...'")
+        raise argparse.ArgumentTypeError(f"'{text}' is none of: auto, exact, regions, a number, '#rrggbb,#rrggbb,...'")
     return [(int(p[1:3], 16), int(p[3:5], 16), int(p[5:7], 16)) for p in parts]
 
 
@@ -152,7 +152,10 @@ def _write_or(write: Callable[[Any], str], none: str) -> Callable[[Any], str]:
 _QUOTED = "a name that holds a comma stands in double quotes"
 #: by name of the field: options that are no plain number, flag or choice
 TEXTS: Mapping[str, Text] = {
-    "colors": Text(colors, _write_colors, "auto|exact|N|#rrggbb,#rrggbb", "A palette is written '#rrggbb,#rrggbb'."),
+    "colors": Text(
+        colors, _write_colors, "auto|exact|regions|N|#rrggbb,#rrggbb", "A palette is written '#rrggbb,#rrggbb'."
+    ),
+    "marks": Text(_none_or(str, ""), _write_or(str, ""), "FILE", "Empty: none."),
     "min_pixels": Text(whole_or_auto, str, "auto|N"),
     "min_length": Text(real_or_auto, lambda v: v if isinstance(v, str) else repr(v), "auto|LENGTH"),
     "boundary_size": Text(_none_or(number, "auto"), _write_or(repr, "auto"), "LENGTH", "auto: as inside."),

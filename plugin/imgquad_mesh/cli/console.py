@@ -34,6 +34,8 @@ def print_report(report: dict[str, Any]) -> None:
         console.print(f"... and {len(rows) - 12} more materials, see --report")
     for line in _lines(report):
         console.print(line, markup=False, soft_wrap=True)
+    for text in report["warnings"]:
+        Console(stderr=True, highlight=False).print(f"warning: {text}", markup=False, soft_wrap=True)
 
 
 def _lines(report: dict[str, Any]) -> Iterator[str]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import imgquad_core as core
 from imgquad_mesh.datasets import grids, images, lines
@@ -23,7 +24,9 @@ Unit: TypeAlias = Literal["pixels", "world"]
 Policy: TypeAlias = Literal["minority", "majority", "lower", "diagonal", "junction"]
 Periodic: TypeAlias = Literal["none", "x", "y", "xy"]
 Triangulator: TypeAlias = Literal["auto", "triangle", "cdt"]
-Colors: TypeAlias = "Literal['auto', 'exact'] | int | Sequence[Sequence[int]]"
+Colors: TypeAlias = "Literal['auto', 'exact', 'regions'] | int | Sequence[Sequence[int]]"
+Flatten: TypeAlias = Literal["auto", "off"]
+Marks: TypeAlias = "str | Path | ArrayLike | None"
 MaterialSizes: TypeAlias = "Mapping[str | int, float] | None"
 
 
@@ -32,10 +35,14 @@ def segment(
     scalars: str | None = None,
     *,
     colors: Colors = "auto",
+    flatten: Flatten = "auto",
+    marks: Marks = None,
+    learn: bool = False,
+    fill_void: int = 0,
     drop_transparent: bool = False,
     progress_bar: bool = False,
 ) -> pv.ImageData:
-    """Give each pixel of a flat image a material by its colour.
+    """Give each pixel of a flat image a material, by its colour or by marks.
 
     Parameters
     ----------
@@ -43,10 +50,20 @@ def segment(
         One pixel thick, of points or cells, in any plane.
     scalars : str, optional
         Name of scalars to process: labels, greys, RGB or RGBA. Defaults to currently active scalars.
-    colors : "auto" | "exact" | int | sequence, default: "auto"
-        ``"exact"``: one material per distinct value. A number: quantised to that many colours. A sequence of RGB (0 to
-        255): the nearest of them. ``"auto"``: exact up to 32 colours, else quantised to a number that the histogram
-        suggests.
+    colors : "auto" | "exact" | "regions" | int | sequence, default: "auto"
+        ``"exact"``: one material per distinct value. ``"regions"``: one per connected region of one colour (grain
+        maps). A number: divided in that many classes. A sequence of RGB (0 to 255): the nearest of them. ``"auto"``:
+        one per value in label images, which are told by their pixels, else as many classes as are far apart.
+    flatten : "auto" | "off", default: "auto"
+        Take uneven light out of grey images, where that separates the classes better.
+    marks : str | path | array_like, optional
+        Pixels whose material is known, from which materials grow: the name of an array of the image (0: not marked), a
+        picture of strokes (palette index 0 and clear pixels are not marked), an array, shape (rows, columns), the top
+        row first, or points, shape (n, 4): x and y in pixels from the upper left corner, radius, material.
+    learn : bool, default: False
+        Let a random forest learn from the marks what else is marked for sure (scikit-learn).
+    fill_void : int, default: 0
+        Void clusters (NaN, -1) of at most so many pixels go to the material with the longest common border.
     drop_transparent : bool, default: False
         Pixels of alpha 0 get the material -1, which is not meshed.
     progress_bar : bool, default: False
@@ -70,11 +87,27 @@ def segment(
     >>> image.imgquad.segment().field_data["material_numbers"]
     pyvista_ndarray([  0, 200], dtype=int32)
     """
-    values = checked(colors=colors, drop_transparent=drop_transparent)
+    values = checked(colors=colors, flatten=flatten, learn=learn, fill_void=fill_void)
+    values |= checked(drop_transparent=drop_transparent)
+    values |= _marked(image, scalars, marks)
     with progress_of(progress_bar) as begin:
         begin("segment")
         found = images.segmented(image, scalars, core.picture.SegmentationOptions(**values))
-        return images.with_materials(image, found, scalars)
+    _warn(found.warnings)
+    return images.with_materials(image, found, scalars)
+
+
+def _marked(image: pv.ImageData, scalars: str | None, marks: Marks) -> dict[str, Any]:
+    """Return the marks: an array of the image where they name one."""
+    given = checked(marks=marks)
+    if isinstance(marks, str) and marks in image.array_names:
+        given["marks"] = _columns(image, [marks], scalars)[marks]
+    return given
+
+
+def _warn(said: Iterable[str]) -> None:
+    for text in said:
+        warnings.warn(text, stacklevel=4)  # of the caller of the accessor's method
 
 
 def remove_noise(
@@ -183,6 +216,10 @@ def mesh(
     material_sizes: MaterialSizes = None,
     growth: float = 1.3,
     colors: Colors = "auto",
+    flatten: Flatten = "auto",
+    marks: Marks = None,
+    learn: bool = False,
+    fill_void: int = 0,
     min_pixels: int | Auto = "auto",
     min_length: float | Auto = "auto",
     policy: Policy = "minority",
@@ -215,8 +252,16 @@ def mesh(
         The same in single materials, by name or number.
     growth : float, default: 1.3
         Largest ratio of the sizes of neighbouring elements.
-    colors : "auto" | "exact" | int | sequence, default: "auto"
+    colors : "auto" | "exact" | "regions" | int | sequence, default: "auto"
         How colours become materials, see `segment`.
+    flatten : "auto" | "off", default: "auto"
+        Take uneven light out of grey images, where that separates the classes better.
+    marks : str | path | array_like, optional
+        Pixels whose material is known, from which materials grow, see `segment`.
+    learn : bool, default: False
+        Let a random forest learn from the marks what else is marked for sure (scikit-learn).
+    fill_void : int, default: 0
+        Void clusters (NaN, -1) of at most so many pixels go to the material with the longest common border.
     min_pixels, min_length : float | "auto", default: "auto"
         Clusters of fewer pixels that are also shorter (in pixels) are removed, see `remove_noise`.
     policy : str, default: "minority"
@@ -262,7 +307,8 @@ def mesh(
     Warns
     -----
     UserWarning
-        Thin features force many times more quads than the area over the square of the size.
+        Thin features force many times more quads than the area over the square of the size, or it is doubtful what
+        the materials are.
 
     Examples
     --------
@@ -278,7 +324,9 @@ def mesh(
     values = checked(growth=growth, policy=policy, edge_ratio=edge_ratio, max_shift=max_shift, effort=effort)
     values |= checked(threads=threads, triangulator=triangulator, periodic=periodic)
     values |= checked(min_pixels=min_pixels, min_length=min_length, drop=drop)
-    early = checked(colors=colors, drop_transparent=drop_transparent)
+    early = checked(colors=colors, flatten=flatten, learn=learn, fill_void=fill_void)
+    early |= checked(drop_transparent=drop_transparent)
+    early |= _marked(image, scalars, marks)
     placement = images.image_placement(image, scalars)
     values |= in_pixels(sizes, unit, placement.pixel_size)
     options = core.MeshOptions(**values, pixel_size=placement.sides)
@@ -288,8 +336,7 @@ def mesh(
         found = images.segmented(image, scalars, core.picture.SegmentationOptions(**early))
         done = core.pipeline.run(found, options, lambda stage, *_: begin(stage))
     many = core.pipeline.thin_features(done.labels, done.pixel_mesh, options)
-    if many:
-        warnings.warn(many, stacklevel=3)  # of the caller of the accessor's method
+    _warn((*found.warnings, many) if many else found.warnings)
     grid = grids.to_grid(done.pixel_mesh, placement.divided(done.labels.shape, done.boundary.shape))
     _sample(grid, done.pixel_mesh, columns, done.boundary.shape)
     return grid

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from numbers import Number
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -93,13 +94,17 @@ def _limit_of_noise(value: Any, name: str) -> Any:
 
 def _colors(value: Any, name: str) -> Any:
     if isinstance(value, str):
-        return choice(value, name, ("auto", "exact"))
+        return choice(value, name, ("auto", "exact", "regions"))
     if isinstance(value, Iterable):
         palette = _validation.validate_array(
             value, must_have_shape=(-1, 3), must_be_in_range=(0, 255), must_be_finite=True, name=name
         )
         return [tuple(map(int, color)) for color in palette]
     return _number(value, name, whole=True, limits=(1, 256))
+
+
+def _marks(value: Any, name: str) -> Any:
+    return value if value is None or isinstance(value, (str, Path)) else _validation.validate_array(value, name=name)
 
 
 def _sizes(value: Any, name: str) -> dict[str | int, float]:
@@ -136,6 +141,7 @@ _OWN: Mapping[str, Callable[[Any, str], Any]] = {
     "boundary_size": _length_or_none,
     "material_sizes": _sizes,
     "colors": _colors,
+    "marks": _marks,
     "min_pixels": _limit_of_noise,
     "min_length": _limit_of_noise,
     "drop": _materials,

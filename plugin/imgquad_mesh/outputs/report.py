@@ -39,6 +39,7 @@ def build_report(
         "rows": rows,
         "options": _options(run),
         "notes": list(notes(run)),
+        "warnings": list(run.segmentation.warnings),
         "materials": [asdict(row) for row in ledger],
         "removed": [asdict(removal) for removal in run.removed],
         "counts": _counts(run),
@@ -87,7 +88,8 @@ def _options(run: Run) -> dict[str, Any]:
         "triangulator": triangulator_used(run.options.triangulator),
     }
     sizes = {str(name): size for name, size in run.options.material_sizes.items()}
-    return values | used | {"material_sizes": sizes}
+    marks = None if run.options.marks is None else str(run.options.marks)
+    return values | used | {"material_sizes": sizes, "marks": marks}
 
 
 def _counts(run: Run) -> dict[str, dict[str, int]]:
