@@ -6,6 +6,9 @@ import runpy
 
 import pyvista as pv
 
+from imgquad_core import MeshOptions
+from imgquad_core.declared import declarations
+from imgquad_mesh.cli.declared_options import flag_of
 from imgquad_mesh.spec import filters
 from support import ROOT
 
@@ -41,3 +44,10 @@ def test_pages_name_every_filter() -> None:
         assert f".. autofunction:: {name}\n" in api
         if name != "boundaries_of_mesh":
             assert f"`{name}`" in guide
+
+
+def test_page_of_options_is_up_to_date() -> None:
+    page = runpy.run_path(str(DOCS / "option_page.py"))
+    assert page["text"]() == (DOCS / "options.md").read_text(encoding="utf-8"), "run python docs/option_page.py"
+    for name in declarations(MeshOptions):
+        assert flag_of(name) in page["text"]()

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
 from imgquad_core.jit import kernel
+from imgquad_core.model import Materials, PointKind, QuadMesh
 
 QUARTER = np.pi / 2
 INNER_VALENCE = 4
@@ -70,3 +71,42 @@ class FaceQuads(NamedTuple):
     face: Ints  #: int64 (n_quads,), region of each quad
     origin: Ints  #: int64 (n,), id of each rim point in the boundary graph, -1 inside
     wanted: Ints  #: int64 (n,), number of quads that a point should have: 4 inside, by the angle on the rim
+
+
+def stitched(
+    quads: FaceQuads,
+    place: Ints,
+    points: Floats,
+    kind: Bytes,
+    chains: tuple[Ints, Ints, Ints],
+    region_label: Labels,
+    materials: Materials,
+) -> QuadMesh:
+    """Join faces at the boundary's points, which come first.
+
+    Parameters
+    ----------
+    quads : FaceQuads
+        Each face with points of its own; `origin` is the point of the boundary that one stands for.
+    place : int64
+        What the point of the boundary `origin` is called in the mesh.
+    points, kind
+        The boundary's points, in the mesh's order.
+    chains : tuple
+        Offsets, points and regions of the chains of the mesh.
+    region_label, materials
+        Of the mesh.
+    """
+    inner = quads.origin < 0
+    n_inner = np.count_nonzero(inner)
+    ids = place[quads.origin]
+    ids[inner] = len(points) + np.arange(n_inner)
+    return QuadMesh(
+        np.vstack([points, quads.points[inner]]),
+        np.concatenate([kind, np.full(n_inner, PointKind.INTERIOR, np.uint8)]),
+        ids[quads.quads],
+        quads.face,
+        region_label,
+        *chains,
+        materials,
+    )

@@ -12,10 +12,10 @@ from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.quad_shape import lower_to_worst, nodes_of_poor
 from imgquad_core.grouping import grouped
 from imgquad_core.measures.quality import corner_angles, scaled_jacobian, sectors_of
-from imgquad_core.model import PointKind, QuadMesh
+from imgquad_core.model import QuadMesh
 
 from .batches import in_batches
-from .faces import INNER_VALENCE, FaceQuads, faces_only, joined, wanted_quads
+from .faces import INNER_VALENCE, FaceQuads, faces_only, joined, stitched, wanted_quads
 from .irregular_nodes import clean_up
 from .options import CleanUp, OptimizationOptions
 from .relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
@@ -129,17 +129,5 @@ def _stitch(mesh: QuadMesh, quads: FaceQuads) -> QuadMesh:
     rim = np.unique(mesh.chain_points)
     place = np.full(mesh.n_points, -1, np.int64)
     place[rim] = np.arange(len(rim))
-    inner = quads.origin < 0
-    ids = place[quads.origin]
-    ids[inner] = len(rim) + np.arange(np.count_nonzero(inner))
-    return QuadMesh(
-        np.vstack([mesh.points[rim], quads.points[inner]]),
-        np.concatenate([mesh.point_kind[rim], np.full(np.count_nonzero(inner), PointKind.INTERIOR, np.uint8)]),
-        ids[quads.quads],
-        quads.face,
-        mesh.region_label,
-        mesh.chain_offsets,
-        place[mesh.chain_points],
-        mesh.chain_regions,
-        mesh.materials,
-    )
+    chains = (mesh.chain_offsets, place[mesh.chain_points], mesh.chain_regions)
+    return stitched(quads, place, mesh.points[rim], mesh.point_kind[rim], chains, mesh.region_label, mesh.materials)

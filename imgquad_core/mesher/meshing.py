@@ -17,7 +17,7 @@ from imgquad_core import ahead
 from imgquad_core.arrays import Flags, Labels
 from imgquad_core.chains import without_unused_points
 from imgquad_core.cleanup.batches import in_threads
-from imgquad_core.cleanup.faces import FaceQuads, joined
+from imgquad_core.cleanup.faces import FaceQuads, joined, stitched
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.cleanup.relaxation import GOOD, newton, rings_of, untangle
 from imgquad_core.cleanup.sliding import slide
@@ -70,23 +70,8 @@ def mesh_boundaries(
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
     """Join faces at the boundary's points."""
     graph, place = without_unused_points(graph)
-    quads = joined(parts)
-    inner = quads.origin < 0
-    ids = place[quads.origin]
-    ids[inner] = len(graph.points) + np.arange(inner.sum())
-    points = np.vstack([graph.points, quads.points[inner]])
-    kind = np.concatenate([graph.point_kind, np.full(inner.sum(), PointKind.INTERIOR, np.uint8)])
-    return QuadMesh(
-        points,
-        kind,
-        ids[quads.quads],
-        quads.face,
-        graph.region_label,
-        graph.chain_offsets,
-        graph.chain_points,
-        graph.chain_regions,
-        materials,
-    )
+    chains = (graph.chain_offsets, graph.chain_points, graph.chain_regions)
+    return stitched(joined(parts), place, graph.points, graph.point_kind, chains, graph.region_label, materials)
 
 
 def _slid(mesh: QuadMesh, rounds: int, threads: int, portions: Portions) -> QuadMesh:

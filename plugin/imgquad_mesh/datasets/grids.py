@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
+import imgquad_core as core
 from imgquad_core.errors import InputError
 from imgquad_core.model import QuadMesh
 from imgquad_core.writers.common import safe_names
 
-from .fields import MATERIAL_FIELDS, put_materials
+from .fields import MATERIAL_FIELDS, materials_of, put_materials
 from .placement import PLAIN, Placement
-
-if TYPE_CHECKING:
-    from imgquad_core.fe.femesh import FEMesh
-    from imgquad_core.model import Materials
 
 FLAT = 1e-6  #: largest distance from the plane, relative to the extent
 #: VTK cell of each element kind
@@ -46,7 +43,7 @@ def to_grid(mesh: QuadMesh, placement: Placement = PLAIN) -> pv.UnstructuredGrid
     return grid
 
 
-def quads_of(grid: pv.UnstructuredGrid | pv.PolyData) -> NDArray[np.int64]:
+def quads_of(grid: pv.DataObject) -> NDArray[np.int64]:
     """Return the points of each quad, shape (n, 4).
 
     Raises
@@ -54,15 +51,18 @@ def quads_of(grid: pv.UnstructuredGrid | pv.PolyData) -> NDArray[np.int64]:
     InputError
         There are no cells, or others than quads.
     """
-    if isinstance(grid, pv.PolyData):
-        faces = grid.faces
-        is_quads = grid.n_cells and len(faces) == 5 * grid.n_cells and (faces[::5] == 4).all()
+    if isinstance(grid, pv.UnstructuredGrid):
+        n_quads, cells = int((grid.celltypes == pv.CellType.QUAD).sum()), grid.cells
+    elif isinstance(grid, pv.PolyData):
+        cells = grid.faces
+        n_quads = grid.n_cells if len(cells) == 5 * grid.n_cells and (cells[::5] == 4).all() else 0
     else:
-        is_quads = grid.n_cells and (grid.celltypes == pv.CellType.QUAD).all()
-    if not is_quads:
-        kinds = "no cells" if not grid.n_cells else "cells that are no quads (VTK_QUAD)"
-        raise InputError(f"this {type(grid).__name__} has {kinds}: give a mesh of quads only")
-    cells = grid.faces if isinstance(grid, pv.PolyData) else grid.cells
+        raise InputError(f"{type(grid).__name__} holds no quads: give an UnstructuredGrid or PolyData")
+    if n_quads != grid.n_cells or n_quads == 0:
+        raise InputError(
+            f"{grid.n_cells - n_quads} of {grid.n_cells} cells are no quads (VTK_QUAD): extract the quads, "
+            "or mesh the picture with image.imgquad.mesh()"
+        )
     return np.asarray(cells, np.int64).reshape(-1, 5)[:, 1:]
 
 
@@ -113,20 +113,18 @@ def to_mesh(grid: pv.UnstructuredGrid | pv.PolyData) -> tuple[QuadMesh, Placemen
 
 def from_grid(dataset: Any, *, folded: bool = False) -> QuadMesh:
     """Return the mesh in a flat grid of quads, the inverse of `to_grid`; see `trace_mesh`."""
-    from imgquad_core.tracing import trace_mesh
-
     points = np.asarray(dataset.points, np.float64)
     if len(points) and np.ptp(points[:, 2]) > 1e-9 * max(np.ptp(points[:, :2]), 1e-300):
         raise InputError("the mesh is not in a plane z = constant: turn it there first, for example rotate_x(90)")
-    quads = _quads(dataset)
+    quads = quads_of(dataset)
     used, numbered = np.unique(quads, return_inverse=True)
     cell_data = dataset.cell_data
     material = np.asarray(cell_data["material"]) if "material" in cell_data else np.zeros(len(quads), np.int32)
-    corners, materials = numbered.reshape(-1, 4), _materials(dataset, material)
-    return trace_mesh(points[used, :2], corners, material, materials, folded=folded)
+    corners, materials = numbered.reshape(-1, 4), materials_of(dataset, material)
+    return core.tracing.trace_mesh(points[used, :2], corners, material, materials, folded=folded)
 
 
-def to_fe_grid(mesh: FEMesh) -> pv.UnstructuredGrid:
+def to_fe_grid(mesh: core.fe.FEMesh) -> pv.UnstructuredGrid:
     """Return a grid of all elements of `mesh`.
 
     Cell arrays `material` (int32; -1 of cohesive elements), `region` and, if there are cohesive elements,
@@ -151,14 +149,12 @@ def to_fe_grid(mesh: FEMesh) -> pv.UnstructuredGrid:
         member = np.zeros(mesh.n_points, np.uint8)
         member[ids] = 1
         grid.point_data[f"set {name}"] = member
-    grid.field_data["material_numbers"] = mesh.materials.labels
-    grid.field_data["material_names"] = np.array(mesh.materials.names, np.str_)
-    grid.field_data["material_colors"] = mesh.materials.colors
+    put_materials(grid, mesh.materials)
     grid.set_active_scalars("material", preference="cell")
     return grid
 
 
-def plain_grid(mesh: FEMesh) -> pv.UnstructuredGrid:
+def plain_grid(mesh: core.fe.FEMesh) -> pv.UnstructuredGrid:
     """Return a grid for readers that know arrays of numbers only: no field arrays, no blanks in names.
 
     Cell arrays `material` and, for SfePy, `mat_id`: 1, 2, ... in the order of `FEMesh.material_names`, then the sets of
@@ -179,32 +175,3 @@ def plain_grid(mesh: FEMesh) -> pv.UnstructuredGrid:
     grid.set_active_scalars(None, preference="point")
     grid.set_active_scalars("material", preference="cell")  # MFEM looks for them
     return grid
-
-
-def _quads(dataset: Any) -> np.ndarray[Any, np.dtype[np.int64]]:
-    if isinstance(dataset, pv.UnstructuredGrid):
-        counts, cells = (dataset.celltypes == pv.CellType.QUAD).sum(), dataset.cells
-        n_cells = dataset.n_cells
-    elif isinstance(dataset, pv.PolyData):
-        n_cells, cells = dataset.n_cells, dataset.faces
-        counts = n_cells if len(cells) == 5 * n_cells and (cells[::5] == 4).all() else 0
-    else:
-        raise InputError(f"{type(dataset).__name__} holds no quads: write an UnstructuredGrid or PolyData")
-    if counts != n_cells or n_cells == 0:
-        raise InputError(
-            f"{n_cells - counts} of {n_cells} cells are no quads (VTK_QUAD): extract the quads, "
-            "or mesh the picture with image.imgquad.mesh()"
-        )
-    return np.asarray(cells, np.int64).reshape(-1, 5)[:, 1:]
-
-
-def _materials(dataset: Any, material: Any) -> Materials:
-    from imgquad_core.model import Materials
-
-    fields = dataset.field_data
-    if "material_numbers" in fields and "material_names" in fields:
-        numbers, names = np.asarray(fields["material_numbers"]), tuple(map(str, fields["material_names"]))
-        colors = np.asarray(fields["material_colors"]) if "material_colors" in fields else np.full((len(names), 3), 128)
-        return Materials(numbers, names, colors)
-    numbers = np.unique(material)
-    return Materials(numbers, tuple(f"material {m}" for m in numbers), np.full((len(numbers), 3), 128))

@@ -13,7 +13,7 @@ import imgquad_core as core
 from imgquad_core.errors import InputError
 from imgquad_core.model import LabelImage
 
-from .fields import materials_of, put_materials
+from .fields import NUMBERS, materials_of, put_materials
 from .placement import Placement
 
 MATERIAL = "material"  #: array that a segmented image has
@@ -98,7 +98,7 @@ def segmented(
     """Return the materials of an image: those it has already, else found in its scalars."""
     name, _ = scalars_of(image, scalars)
     values, options = image_array(image, name), options or core.picture.SegmentationOptions()
-    if name != MATERIAL or "material_numbers" not in image.field_data or options.colors not in ("auto", "exact"):
+    if name != MATERIAL or NUMBERS not in image.field_data or options.colors not in ("auto", "exact"):
         return core.picture.segment_picture(values, options)
     materials = materials_of(image)
     unknown = np.setdiff1d(values, [-1, *materials.labels])

@@ -13,12 +13,12 @@ from pyvista.core.errors import MissingDataError
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, BoundaryGraph, Materials
 
-from .fields import materials_of, put_materials
+from .fields import MATERIAL_FIELDS, materials_of, put_materials
 from .placement import PLAIN, Placement
 
 POINT_ARRAYS = ("point_kind", "pixel_coordinates")
 FIELD_ARRAYS = (
-    "material_numbers", "material_names", "material_colors",
+    *MATERIAL_FIELDS,
     "region_label", "region_pixels", "picture_shape", "pixel_origin", "pixel_axes",
 )  # fmt: skip
 SIZES = "mesh_sizes"  #: field array of a smoothed boundary: size and growth
