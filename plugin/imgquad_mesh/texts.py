@@ -69,7 +69,7 @@ def _write_cohesive(pairs: Any) -> str:
 
 
 def _write_sides(size: float | tuple[float, float]) -> str:
-    return ",".join(map("{:g}".format, size)) if isinstance(size, tuple) else f"{size:g}"
+    return ",".join(repr(float(side)).removesuffix(".0") for side in (size if isinstance(size, tuple) else (size,)))
 
 
 def sides(text: str) -> float | tuple[float, float]:

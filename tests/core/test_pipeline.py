@@ -131,6 +131,27 @@ def test_elements_have_the_size_asked_for() -> None:
         assert mesh.n_quads == pytest.approx(80 * 120 / size**2, rel=0.15)
 
 
+@pytest.mark.parametrize("sides", [(0.5, 0.25), (0.3, 0.39)])
+def test_pixels_that_are_not_square_are_meshed_in_true_shape(sides: tuple[float, float]) -> None:
+    rows, cols = round(40 * 0.25 / sides[1] * 2), round(30 * 0.5 / sides[0] * 2)
+    y, x = (np.mgrid[:rows, :cols] + 0.5) * np.array(sides[::-1])[:, None, None]
+    round_one = label_image(np.hypot(x - 15, y - 10) < 5)
+    done = run(round_one, MeshOptions(size=3.0, pixel_size=sides))
+    assert done.mesh.points.max(axis=0) == pytest.approx([cols * sides[0], rows * sides[1]], rel=1e-14)
+    edges = np.roll(done.mesh.points[done.mesh.quads], 1, axis=1) - done.mesh.points[done.mesh.quads]
+    assert np.hypot(*edges.T).mean() == pytest.approx(3.0 * min(sides), rel=0.2)
+    assert quality_report(done.mesh).min_sj > 0.5
+    (_, disc_account) = material_ledger(done.picture, done.labels, done.boundary, done.mesh, done.options.pixel_sides)
+    assert disc_account.mesh_area * sides[0] * sides[1] == pytest.approx(25 * np.pi, rel=0.02)
+    assert disc_account.boundary_area == pytest.approx(disc_account.mesh_area, rel=1e-6)
+    assert abs(disc_account.error) < 0.01
+
+
+def test_absurdly_stretched_pixels_are_refused() -> None:
+    with pytest.raises(InputError, match=r"would need about .* for 30 x 10000000000 pixels: .* mend its spacing"):
+        run(label_image(np.eye(30)[:20]), MeshOptions(pixel_size=(1.0, 5e8)))
+
+
 def test_mesh_is_in_the_unit_of_the_pixel_size() -> None:
     plain, scaled = (run(disc(), MeshOptions(pixel_size=s)).mesh for s in (1.0, 0.25))
     assert np.allclose(scaled.points, plain.points / 4)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -18,6 +18,7 @@ from .names import all_meshlab_names, meshlab_function, nearest
 from .steps import STEPS, check_output, script_path
 
 #: types in scripts that stand for the same kind of value
+_NUMBER_OR_TEXT = ("pixel_size",)  # a number, or two of them in a text
 _SAME_TYPE = {"RichOpenFile": "RichString", "RichSaveFile": "RichString"}
 #: MeshLab's parameters that name files, whatever their type in the script; a texture's name has no folder
 _FILE_PARAMETER = re.compile(r"file|path")
@@ -153,6 +154,8 @@ def _own_step(script: Script, each: ScriptFilter, spec: Filter, folder: Path) ->
 
 
 def _own_value(script: Script, spec: Filter, parameter: Parameter, given: ScriptParameter, folder: Path) -> Any:
+    if parameter.field in _NUMBER_OR_TEXT and given.kind in ("RichFloat", "RichInt"):
+        given = replace(given, kind="RichString", value=repr(given.value))
     kind = _SAME_TYPE.get(given.kind, given.kind)
     if kind != parameter.script_type:
         _fail(script, given.line, f"parameter {given.name!r} of filter {spec.name!r} is of type {given.kind}; "
