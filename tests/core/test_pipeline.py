@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import imgquad_core
 from imgquad_core.errors import InputError, QualityError
@@ -20,53 +18,14 @@ from imgquad_core.options import MeshOptions
 from imgquad_core.picture.selection import crop_image, drop_materials, material_number
 from imgquad_core.pipeline import STAGES, mesh_image, run, thin_features
 from support.invariants import assert_valid_mesh
-from support.labels import wedge
-
-Labels = NDArray[np.int32]
-
-
-def label_image(labels: Any) -> LabelImage:
-    labels = np.asarray(labels, np.int32)
-    numbers = np.unique(labels[labels != VOID])
-    colors = np.stack([numbers * 37 % 256] * 3, axis=-1)
-    return LabelImage(labels, Materials(numbers, tuple(f"m{n}" for n in numbers), colors))
-
-
-def stripes(rows: int, cols: int, seed: int) -> Labels:
-    return np.asarray((np.arange(cols) // (1 + seed % 3) + np.zeros((rows, 1))) % 3, np.int32)
-
-
-def checkerboard(rows: int, cols: int, seed: int) -> Labels:
-    return np.asarray(np.add.outer(np.arange(rows), np.arange(cols)) % 2, np.int32)
-
-
-def speckles(rows: int, cols: int, seed: int) -> Labels:
-    return (np.random.default_rng(seed).random((rows, cols)) < 0.08).astype(np.int32)
-
-
-def noise(rows: int, cols: int, seed: int) -> Labels:
-    return np.random.default_rng(seed).integers(0, 1 + seed % 8, (rows, cols)).astype(np.int32)
-
-
-def patches(rows: int, cols: int, seed: int) -> Labels:
-    rng = np.random.default_rng(seed)
-    coarse = rng.integers(0, 4, (rows // 5 + 1, cols // 5 + 1))
-    return np.kron(coarse, np.ones((5, 5), int))[:rows, :cols].astype(np.int32)
-
-
-def spiral(rows: int, cols: int, seed: int) -> Labels:
-    y, x = np.mgrid[:rows, :cols] - np.array([rows / 2, cols / 2])[:, None, None]
-    turn = np.hypot(x, y) / (2 + seed % 3) - np.arctan2(y, x) / np.pi
-    return (np.floor(turn) % 2).astype(np.int32)
-
-
-MAKERS: list[Callable[[int, int, int], Labels]] = [stripes, checkerboard, speckles, noise, patches, spiral]
+from support.labels import KINDS, Labels, label_image, labels_of_kind, voronoi, wedge
 
 pictures = st.builds(
-    lambda make, rows, cols, seed: make(rows, cols, seed),
-    st.sampled_from(MAKERS),
+    labels_of_kind,
+    st.sampled_from(KINDS),
     st.integers(1, 30),
     st.integers(1, 30),
+    st.integers(1, 8),
     st.integers(0, 10_000),
 )
 quickly = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
@@ -102,7 +61,7 @@ def test_void_is_left_out(labels: Labels, void: int) -> None:
 
 @pytest.mark.parametrize("effort", ["fast", "normal", "best"])
 def test_every_effort_is_valid_and_the_same_with_two_threads(effort: str) -> None:
-    image = label_image(patches(60, 80, 5))
+    image = label_image(voronoi(60, 80, 15, 5) % 4)
     one = mesh_image(image, MeshOptions(size=2, effort=effort))
     two = mesh_image(image, MeshOptions(size=2, effort=effort, threads=2))
     assert_valid_mesh(one, image)
@@ -228,7 +187,7 @@ def test_lazy_names_of_the_package() -> None:
 
 
 def test_thin_features_are_told_with_their_count_and_the_remedies() -> None:
-    image = label_image(speckles(60, 60, 1))
+    image = label_image(np.random.default_rng(1).random((60, 60)) < 0.08)
     options = MeshOptions(size=6.0, min_pixels=0, min_length=0)
     done = run(image, options)
     told = thin_features(done.labels, done.mesh, options)

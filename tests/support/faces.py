@@ -143,13 +143,6 @@ def grid(n: int, m: int, jiggle: float = 0.0, seed: int = 0) -> FaceQuads:
     return FaceQuads(points, quads, np.zeros(n * m, np.int64), np.where(inner, -1, np.arange(len(x))), wanted)
 
 
-def areas(points: Points, polygons: Ids) -> Points:
-    """Signed area of each polygon."""
-    p, q = points[polygons], points[np.roll(polygons, -1, axis=1)]
-    total: Points = 0.5 * (p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]).sum(axis=1)
-    return total
-
-
 def valences(mesh: FaceQuads) -> Ids:
     """Number of quads at each point."""
     return np.bincount(mesh.quads.ravel(), minlength=len(mesh.points))

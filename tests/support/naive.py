@@ -31,6 +31,18 @@ def twins(faces: Ids) -> Ids:
     return out
 
 
+def areas(points: Points, polygons: Ids) -> Points:
+    """Signed area of each polygon, by the shoelace formula."""
+    p, q = points[polygons], points[np.roll(polygons, -1, axis=1)]
+    total: Points = 0.5 * (p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]).sum(axis=1)
+    return total
+
+
+def lengths(points: Points, pairs: Ids) -> Points:
+    """Length of each edge, given by the ids of its ends, shape (..., 2)."""
+    return np.asarray(np.hypot(*np.moveaxis(points[pairs[..., 1]] - points[pairs[..., 0]], -1, 0)))
+
+
 def corner_sines(points: Points, quads: Ids) -> Points:
     """Sine of each corner angle of each quad, shape (n, 4)."""
     p = points[quads]

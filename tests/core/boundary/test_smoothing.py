@@ -18,6 +18,7 @@ from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.corner_rule import POLICIES
 from imgquad_core.model import BoundaryGraph, PointKind
+from support import naive
 from support.labels import any_labels, disc, half_plane, label_image, spiral, square, voronoi, wedge
 from support.planar import check_meshable, check_planar
 
@@ -36,7 +37,7 @@ def interface(graph: BoundaryGraph) -> tuple[NDArray[np.float64], NDArray[np.flo
 
 
 def edge_lengths(graph: BoundaryGraph) -> NDArray[np.float64]:
-    return np.hypot(*(graph.points[graph.segments[:, 1]] - graph.points[graph.segments[:, 0]]).T)
+    return naive.lengths(graph.points, graph.segments)
 
 
 def assert_truth(off: NDArray[np.float64], length: float, true_length: float) -> None:

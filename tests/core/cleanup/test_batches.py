@@ -11,7 +11,8 @@ from imgquad_core.cleanup.batches import in_batches
 from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
 from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
 from imgquad_core.cleanup.options import Portions
-from support.faces import areas, assert_valid_faces, quads_of, voronoi_graph
+from support import naive
+from support.faces import assert_valid_faces, quads_of, voronoi_graph
 
 SMALL = Portions(batch=150)
 
@@ -84,7 +85,9 @@ def test_some_faces_only(grains: FaceQuads) -> None:
     assert_valid_faces(some)
     assert set(some.face.tolist()) == {1, 7, 8}
     kept = chosen[grains.face]
-    assert areas(some.points, some.quads).sum() == pytest.approx(areas(grains.points, grains.quads[kept]).sum())
+    assert naive.areas(some.points, some.quads).sum() == pytest.approx(
+        naive.areas(grains.points, grains.quads[kept]).sum()
+    )
     assert faces_only(grains, np.ones(16, bool)) is grains
     assert len(faces_only(grains, np.zeros(16, bool)).quads) == 0
 

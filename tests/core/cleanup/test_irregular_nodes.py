@@ -11,7 +11,6 @@ from imgquad_core.cleanup.relaxation import laplace, rings_of
 from imgquad_core.mesher.splitting import split_composed
 from support import naive
 from support.faces import (
-    areas,
     assert_valid_faces,
     grid,
     irregularity,
@@ -69,8 +68,8 @@ def test_result_is_valid_more_regular_and_keeps_rim_and_areas(make: type, seed: 
     assert new.points[kept].tobytes() == old.points[before].tobytes()
     assert np.array_equal(new.wanted[kept], old.wanted[before])
     assert np.allclose(
-        np.bincount(new.face, weights=areas(new.points, new.quads)),
-        np.bincount(old.face, weights=areas(old.points, old.quads)),
+        np.bincount(new.face, weights=naive.areas(new.points, new.quads)),
+        np.bincount(old.face, weights=naive.areas(old.points, old.quads)),
     )
     worst_old, worst_new = (naive.worst_quality(m.points, m.quads) for m in (old, new))
     assert worst_new >= min(how.worst, worst_old) - 1e-12

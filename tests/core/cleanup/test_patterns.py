@@ -21,7 +21,7 @@ from imgquad_core.cleanup.patterns import (
     spoke,
 )
 from support import naive
-from support.faces import Ids, Points, areas
+from support.faces import Ids, Points
 
 ROOM = 2000
 
@@ -64,7 +64,7 @@ def assert_pattern(canvas: Canvas, outline: Points, corner: Ids, irregular: list
     rim = np.flatnonzero(twins == -1)
     tail, head = quads.ravel()[rim], np.roll(quads, -1, axis=1).ravel()[rim]
     assert sorted(zip(tail.tolist(), head.tolist(), strict=True)) == [(i, (i + 1) % n) for i in range(n)]
-    assert areas(points, quads).sum() == pytest.approx(areas(points, np.arange(n)[None])[0])
+    assert naive.areas(points, quads).sum() == pytest.approx(naive.areas(points, np.arange(n)[None])[0])
     valence = np.bincount(quads.ravel())
     expected = np.full(n, 2)
     expected[corner] = 1

@@ -18,7 +18,8 @@ from imgquad_core.measures.quality import quality_report
 from imgquad_core.mesher.efforts import MeshingOptions, Tuning
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import LabelImage
-from support.faces import areas, assert_valid_faces, grid, polygon_graph, quads_of, valences
+from support import naive
+from support.faces import assert_valid_faces, grid, polygon_graph, quads_of, valences
 from support.invariants import assert_valid_mesh
 from support.labels import label_image, labels_of_kind, pixel_centres
 
@@ -97,7 +98,9 @@ def test_new_quads_are_sewn_in_and_threads_do_not_change_a_byte(face: FaceQuads,
     assert table(alone, "origin").items() >= {k: v for k, v in table(face, "origin").items() if v >= 0}.items()
     assert 0 < irregular(alone) < irregular(face)
     assert not seams[alone.origin < 0].all()
-    assert areas(alone.points, alone.quads).sum() == pytest.approx(areas(face.points, face.quads).sum(), rel=1e-12)
+    assert naive.areas(alone.points, alone.quads).sum() == pytest.approx(
+        naive.areas(face.points, face.quads).sum(), rel=1e-12
+    )
 
 
 def irregular(mesh: FaceQuads) -> int:

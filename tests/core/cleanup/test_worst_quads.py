@@ -9,7 +9,7 @@ from imgquad_core.cleanup.faces import FaceQuads
 from imgquad_core.cleanup.relaxation import laplace, rings_of
 from imgquad_core.cleanup.worst_quads import LEAST_GAIN, repair
 from support import naive
-from support.faces import Ids, Points, areas, assert_valid_faces, grid, quads_of, rim_edges, voronoi_graph
+from support.faces import Ids, Points, assert_valid_faces, grid, quads_of, rim_edges, voronoi_graph
 
 
 def rough_polygon(n: int, seed: int) -> Points:
@@ -48,7 +48,7 @@ def test_outline_gets_the_best_of_all_fillings(n: int, seed: int) -> None:
         assert worst(new) <= best + 1e-12
     if worst(new) > 0:
         assert np.array_equal(new.points[:n], old.points)
-        assert areas(new.points, new.quads).sum() == pytest.approx(areas(old.points, np.arange(n)[None])[0])
+        assert naive.areas(new.points, new.quads).sum() == pytest.approx(naive.areas(old.points, np.arange(n)[None])[0])
         assert rim_edges(new) == {(0, i, (i + 1) % n) for i in range(n)}
 
 
@@ -90,7 +90,7 @@ def test_folded_quads_are_replaced() -> None:
     new, _ = repair(old, 0.5)
     assert worst(new) > max(0.0, worst(old))
     assert rim_edges(new) == rim_edges(old)
-    assert areas(new.points, new.quads).sum() == pytest.approx(25)
+    assert naive.areas(new.points, new.quads).sum() == pytest.approx(25)
 
 
 @pytest.mark.parametrize("below", [0.5, 0.8])
@@ -105,7 +105,7 @@ def test_grains_lose_poor_quads_and_nothing_else(seed: int, below: float) -> Non
     assert worst(new) >= worst(old)
     assert rim_edges(new) == rim_edges(old)
     assert new.points[new.origin >= 0].tobytes() == old.points[old.origin >= 0].tobytes()
-    before, after = (np.bincount(m.face, weights=areas(m.points, m.quads)) for m in (old, new))
+    before, after = (np.bincount(m.face, weights=naive.areas(m.points, m.quads)) for m in (old, new))
     assert np.allclose(before, after)
     poor = [np.count_nonzero(naive.corner_sines(m.points, m.quads).min(axis=1) < below) for m in (old, new)]
     assert poor[1] < poor[0] or (poor[0] == 0 and new is old)

@@ -13,18 +13,7 @@ from imgquad_core.mesher.frontal import EXCLUSION, frontal_points, spokes_of_rim
 from imgquad_core.mesher.triangulation import Triangles, constraint_table, triangulate
 from imgquad_core.model import VOID, BoundaryGraph
 from support import naive
-from support.faces import (
-    Ids,
-    Points,
-    areas,
-    cut_of,
-    graph_of,
-    grid,
-    polygon_graph,
-    quads_of,
-    voronoi_graph,
-    with_layers,
-)
+from support.faces import Ids, Points, cut_of, graph_of, grid, polygon_graph, quads_of, voronoi_graph, with_layers
 
 SQUARE = np.array([[0.0, 0], [32, 0], [32, 32], [0, 32]])
 
@@ -128,7 +117,7 @@ def test_points_keep_apart_and_lie_inside_their_faces(seed: int) -> None:
         others = full.points[face == f]
         gap = np.hypot(*(own[:, None] - others[None]).transpose(2, 0, 1))
         assert np.sort(gap, axis=1)[:, 1].min() >= EXCLUSION * smallest * (1 - 1e-9)
-        assert len(own) >= 0.6 * np.abs(areas(full.points, full.triangles)[full.face == f]).sum() / 16 - 40
+        assert len(own) >= 0.6 * np.abs(naive.areas(full.points, full.triangles)[full.face == f]).sum() / 16 - 40
 
 
 def test_quads_wanted_in_a_sector_come_nearest_to_right_angles() -> None:
@@ -167,7 +156,7 @@ def test_pairs_are_mutual_good_and_as_many_as_fit(seed: int) -> None:
     assert np.array_equal(mate[cut.twins[mate[paired]] // 3], cut.twins[mate[paired]])
     quads = pairs_of(cut, mate)
     assert len(quads) == len(paired) // 2
-    assert areas(cut.points, quads).sum() == pytest.approx(areas(cut.points, cut.triangles[paired]).sum())
+    assert naive.areas(cut.points, quads).sum() == pytest.approx(naive.areas(cut.points, cut.triangles[paired]).sum())
     sines = naive.corner_sines(cut.points, quads)
     assert sines.min() > WORST_PAIR
     wide = np.sqrt(1 - WIDE_CORNER**2)  # sine of the widest corner: a wider one has a smaller sine

@@ -12,7 +12,7 @@ from imgquad_core.mesher.outline import outline
 from imgquad_core.mesher.triangulation import constraint_table, triangulate
 from imgquad_core.model import VOID, BoundaryGraph
 from support import naive
-from support.faces import Ids, Points, areas, cut_of, graph_of, polygon_graph, voronoi_graph
+from support.faces import Ids, Points, cut_of, graph_of, polygon_graph, voronoi_graph
 
 
 def two_squares(left: int = 0, right: int = 1) -> CutMesh | FaceConflict:
@@ -27,7 +27,7 @@ def two_squares(left: int = 0, right: int = 1) -> CutMesh | FaceConflict:
 
 def face_areas(cut: CutMesh, n_faces: int) -> Points:
     total = np.zeros(n_faces)
-    np.add.at(total, cut.face, areas(cut.points, cut.triangles))
+    np.add.at(total, cut.face, naive.areas(cut.points, cut.triangles))
     return total
 
 

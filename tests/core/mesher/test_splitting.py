@@ -16,7 +16,6 @@ from imgquad_core.mesher.triangulation import constraint_table
 from imgquad_core.model import BoundaryGraph
 from support import naive
 from support.faces import (
-    areas,
     assert_valid_faces,
     graph_of,
     grid,
@@ -37,8 +36,8 @@ def test_pairs_give_four_quads_and_single_triangles_three(seed: int) -> None:
     n_pairs, n_single = np.count_nonzero(mate >= 0) // 2, np.count_nonzero(mate < 0)
     assert len(mesh.quads) == 4 * n_pairs + 3 * n_single
     assert np.allclose(
-        np.bincount(mesh.face, weights=areas(mesh.points, mesh.quads)),
-        np.bincount(cut.face, weights=areas(cut.points, cut.triangles)),
+        np.bincount(mesh.face, weights=naive.areas(mesh.points, mesh.quads)),
+        np.bincount(cut.face, weights=naive.areas(cut.points, cut.triangles)),
     )
     assert np.array_equal(mesh.points[: len(cut.points)], cut.points)
 
@@ -97,7 +96,9 @@ def test_split_of_quads_adds_no_irregular_node(n: int) -> None:
     n_edges = np.count_nonzero(twins >= 0) // 2 + np.count_nonzero(twins == -1)
     assert len(fine.points) == len(mesh.points) + (n - 1) * n_edges + (n - 1) ** 2 * len(mesh.quads)
     assert len(fine.quads) == n**2 * len(mesh.quads)
-    assert np.allclose(areas(fine.points, fine.quads).reshape(-1, n**2).sum(axis=1), areas(mesh.points, mesh.quads))
+    assert np.allclose(
+        naive.areas(fine.points, fine.quads).reshape(-1, n**2).sum(axis=1), naive.areas(mesh.points, mesh.quads)
+    )
     assert np.array_equal(fine.face, np.repeat(mesh.face, n**2))
     assert irregularity(fine) == irregularity(mesh) > 0
 

@@ -16,7 +16,7 @@ from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.mesher import triangulators
 from imgquad_core.mesher.triangulation import Triangles, constraint_table, triangulate, triangulator_used
 from support import ROOT, naive
-from support.faces import areas, polygon_graph, voronoi_graph
+from support.faces import polygon_graph, voronoi_graph
 
 SQUARE = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4]])
 AROUND = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
@@ -44,7 +44,7 @@ def test_triangles_are_positive_fill_the_square_and_keep_all_segments(
     points, segments = grains(seed)
     mesh = triangulate(points, segments, max_area, by)
     assert np.array_equal(mesh.points[: len(points)], points)
-    area = areas(mesh.points, mesh.triangles)
+    area = naive.areas(mesh.points, mesh.triangles)
     assert area.min() > 0
     assert area.sum() == pytest.approx(64**2, rel=1e-12)
     assert {(a, b) for a, b in np.sort(segments, axis=1).tolist()} <= edges_of(mesh)
@@ -93,7 +93,7 @@ def test_no_small_angles_where_triangle_may_add_points() -> None:
 def test_triangles_get_larger_away_from_short_constraints(by: str, edges: int) -> None:
     graph = polygon_graph(SQUARE * 16, [edges] * 4, (64, 64))
     mesh = triangulate(graph.points, graph.segments, 64.0, by)
-    area, middle = areas(mesh.points, mesh.triangles), mesh.points[mesh.triangles].mean(axis=1)
+    area, middle = naive.areas(mesh.points, mesh.triangles), mesh.points[mesh.triangles].mean(axis=1)
     to_rim = np.minimum(middle, 64 - middle).min(axis=1)
     assert area[to_rim > 16].mean() >= 0.35 * 64
     beside = area[to_rim < 0.5 * 64 / edges].mean()
@@ -103,7 +103,7 @@ def test_triangles_get_larger_away_from_short_constraints(by: str, edges: int) -
 
 def test_cdt_adds_points_even_where_constraints_are_longer_than_the_triangles_asked_for() -> None:
     mesh = triangulate(SQUARE, AROUND, 0.05, "cdt")
-    area = areas(mesh.points, mesh.triangles)
+    area = naive.areas(mesh.points, mesh.triangles)
     assert area.sum() == pytest.approx(16)
     assert np.median(area) <= 0.05
     assert (np.abs(mesh.points[4:] - 2) < 2).all()
@@ -115,7 +115,7 @@ def test_hole_between_two_outlines_is_filled_and_what_lies_outside_is_not(by: st
     points = np.vstack([SQUARE, inner, [[6, 2]]])  # the last point makes a triangle on the right
     segments = np.vstack([AROUND, AROUND + 4, [[1, 8], [8, 2]]])
     mesh = triangulate(points, segments, triangulator=by)
-    assert areas(mesh.points, mesh.triangles).sum() == pytest.approx(16 + 4)
+    assert naive.areas(mesh.points, mesh.triangles).sum() == pytest.approx(16 + 4)
 
 
 @both

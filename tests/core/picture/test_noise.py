@@ -9,23 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 from scipy.ndimage import label as connected
 
 from imgquad_core.errors import InputError
-from imgquad_core.model import VOID, LabelImage, Materials
+from imgquad_core.model import VOID
 from imgquad_core.picture.noise import DenoiseOptions, automatic_limits, list_removed, remove_noise
-
-Labels = NDArray[np.int32]
-
-
-def image_of(labels: Labels) -> LabelImage:
-    values = np.unique(labels[labels != VOID]) if np.any(labels != VOID) else np.array([0])
-    return LabelImage(labels, Materials(values, tuple(f"m{v}" for v in values), np.zeros((len(values), 3))))
+from support.labels import Labels, label_image
 
 
 def cleaned(labels: Labels, min_pixels: int, min_length: float) -> Labels:
-    return remove_noise(image_of(np.asarray(labels)), DenoiseOptions(min_pixels, min_length)).labels
+    return remove_noise(label_image(np.asarray(labels)), DenoiseOptions(min_pixels, min_length)).labels
 
 
 def drawing(text: str) -> Labels:
@@ -135,7 +128,7 @@ def test_the_smallest_goes_first() -> None:
 
 def test_off_by_default_and_for_exact_labels() -> None:
     noise = drawing("010 101 010")
-    image = image_of(noise)
+    image = label_image(noise)
     assert remove_noise(image) is image
     assert remove_noise(image, automatic_limits(quantised=False, shape=(3, 3))) is image
     assert automatic_limits(quantised=True, shape=(5000, 5000)) == DenoiseOptions(256, 16.0)
@@ -163,7 +156,7 @@ def test_the_ledger_lists_clusters_and_pixels_by_material() -> None:
     labels[2, 2] = labels[5:7, 5] = 5
     labels[8, 8:12] = 1_000_000_007
     labels[3:7, 12:16] = 9
-    before = image_of(labels)
+    before = label_image(labels)
     after = remove_noise(before, DenoiseOptions(10, 10))
     found = {(r.name, r.material, r.clusters, r.pixels) for r in list_removed(before, after)}
     assert found == {("m5", 5, 2, 3), ("m1000000007", 1_000_000_007, 1, 4)}
@@ -196,7 +189,7 @@ def test_no_noise_is_left_and_nothing_is_touched_twice(labels: Labels, min_pixel
 @settings(max_examples=30, deadline=None)
 @given(arrays(np.int32, st.tuples(st.integers(1, 12), st.integers(1, 12)), elements=st.integers(0, 2)))
 def test_the_ledger_counts_the_clusters_that_a_flood_fill_finds(labels: Labels) -> None:
-    before = image_of(labels)
+    before = label_image(labels)
     after = remove_noise(before, DenoiseOptions(6, 6))
     changed = before.labels != after.labels
     clusters = [c for c in slow_clusters(labels) if any(changed[p] for p in c)]
@@ -209,7 +202,7 @@ def test_the_ledger_counts_the_clusters_that_a_flood_fill_finds(labels: Labels) 
 
 def test_the_ledger_counts_clusters_that_were_parted_at_a_corner_and_kept_in_part() -> None:
     rows = ("000111", "110110", "101001", "101111", "110111")
-    before = image_of(np.array([list(row) for row in rows], np.int32))
+    before = label_image(np.array([list(row) for row in rows], np.int32))
     after = remove_noise(before, DenoiseOptions(6, 6))
     assert after.labels[0, 0] == 0
     assert [(r.material, r.clusters, r.pixels) for r in list_removed(before, after)] == [(0, 1, 3), (1, 1, 5)]
