@@ -32,7 +32,7 @@ OPTIONS = (
     ElementOptions,
 )
 #: fields that users do not set one by one
-INNER = {"periodic", "open_interfaces"}
+INNER = {"periodic", "open_interfaces", "mark_interfaces"}
 
 
 @dataclass(frozen=True)

@@ -171,7 +171,11 @@ def test_a_default_changed_in_filters_xml_only_is_found(tmp_path: Path) -> None:
             'parName="boundarySize" parType="String" parDefault="\'2\'"',
             "boundary_size",
         ),
-        ('parDefault="false"', 'parDefault="true"', "drop_transparent"),
+        (
+            '"dropTransparent" parType="Boolean" parDefault="false"',
+            '"dropTransparent" parType="Boolean" parDefault="true"',
+            "drop_transparent",
+        ),
     ]:
         assert was in XML
         (tmp_path / "filters.xml").write_text(XML.replace(was, is_now), encoding="utf-8")

@@ -32,9 +32,9 @@ def cost_of(curves: Curves, size: Floats, c: int) -> Floats:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-@pytest.mark.parametrize("in_twelves", [False, True])
+@pytest.mark.parametrize("edge_multiple", [4, 12])
 @pytest.mark.parametrize("asked", [0.7, 3.0])
-def test_nodes_lie_at_equal_steps_of_cost_between_corners(asked: float, in_twelves: bool) -> None:
+def test_nodes_lie_at_equal_steps_of_cost_between_corners(asked: float, edge_multiple: int) -> None:
     curves, _ = drawn()
     n = len(curves.raw)
     limit = np.full(n, asked)
@@ -43,7 +43,7 @@ def test_nodes_lie_at_equal_steps_of_cost_between_corners(asked: float, in_twelv
     inner = curves.offsets[:-1][np.diff(curves.offsets) > 40] + 20
     is_corner[inner] = True
     at_least = np.full(len(curves.ends), 3)
-    placed = place_nodes(curves, size, limit, is_corner, at_least, np.zeros(len(curves.ends), bool), in_twelves)
+    placed = place_nodes(curves, size, limit, is_corner, at_least, np.zeros(len(curves.ends), bool), edge_multiple)
     for c in range(len(curves.ends)):
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
         at = placed.at[placed.offsets[c] : placed.offsets[c + 1]]
@@ -67,7 +67,7 @@ def test_an_exact_chain_has_its_dense_points_as_coarse_nodes() -> None:
     n, exact = len(curves.raw), np.arange(len(curves.ends)) == 3
     size = np.full(n, 4.0)
     ones = np.ones(len(exact), np.int64)
-    placed = place_nodes(curves, size, size, np.zeros(n, bool), ones, exact, False)
+    placed = place_nodes(curves, size, size, np.zeros(n, bool), ones, exact, 4)
     at = placed.at[placed.offsets[3] : placed.offsets[4]]
     assert np.array_equal(at, np.arange(2 * curves.offsets[3], 2 * curves.offsets[4] - 1) / 2)
     assert len(placed.at[placed.offsets[4] : placed.offsets[5]]) < curves.offsets[5] - curves.offsets[4]
