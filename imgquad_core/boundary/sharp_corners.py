@@ -121,10 +121,9 @@ def _corner_at(curves: Curves, c: int, i: int, lengths: Floats) -> tuple[float, 
 
     The longest sides that are straight tell: lines through 6 px of pixel stairs are off by up to 6 degrees.
     """
-    step = curves.ends.shape[1] - 1  # 1, but not a literal: those are compiled for on their own
     for k in range(len(lengths)):
-        n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -step, _NEAR, lengths[k])
-        m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, step, _NEAR, lengths[k])
+        n, ax, ay, ux, uy, rms_u = line_beside(curves, c, i, -1, _NEAR, lengths[k])
+        m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, 1, _NEAR, lengths[k])
         is_straight = max(rms_u, rms_v) <= _STRAIGHT
         if k == 0 and (n < 6 or m < 6 or not is_straight or _turn(ux, uy, vx, vy) < _TURN):
             return 0.0, 0.0, 0.0
