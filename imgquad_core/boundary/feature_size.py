@@ -8,6 +8,8 @@ curve do not count, the other side of a thin vein does, and so do two chains tha
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints
@@ -16,9 +18,17 @@ from imgquad_core.jit import kernel, verb
 
 from .curves import Curves
 
-_REACH = (
-    4.0  # px searched at the finest level; each level has every 4th point of the one before, and four times the reach
-)
+# px searched among all points; each level has every 4th point of the one before, and searches four times as far
+_REACH = 4.0
+
+
+class Buckets(NamedTuple):
+    """Points in square cells, row by row: cell k has ``items[start[k]:start[k + 1]]``."""
+
+    start: Ints
+    items: Ints  #: ids of points
+    n_across: int  #: cells in a row
+    cell: float  #: side of a cell, px
 
 
 def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float, corner: Ints | None = None) -> Floats:
@@ -48,10 +58,8 @@ def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float
     stride, level = 1, min(_REACH, reach)
     while True:
         ids = np.arange(len(points)) if stride == 1 else _every(curves.offsets, stride)
-        cell = max(level / 2, 1.0)
-        n_across, n_up = (points.max(axis=0) / cell).astype(np.int64) + 1
-        start, items = bucket(points, ids, cell, n_across, n_up)
-        _nearest_foreign(points, curves, chain, corner, ids, start, items, n_across, cell, level, bend, lfs)
+        buckets = bucket(points, ids, max(level / 2, 1.0))
+        _nearest_foreign(points, curves, chain, corner, ids, buckets, level, bend, lfs)
         if stride > 1:
             _spread(ids, stride, chain, lfs)
         if level >= reach:
@@ -66,11 +74,12 @@ def _every(offsets: Ints, stride: int) -> Ints:
     return np.flatnonzero(is_taken)
 
 
-def bucket(points: Floats, ids: Ints, cell: float, n_across: int, n_up: int) -> tuple[Ints, Ints]:
-    """Sort the points `ids` into square cells: CSR offsets, items."""
+def bucket(points: Floats, ids: Ints, cell: float) -> Buckets:
+    """Sort the points `ids` into square cells."""
+    n_across, n_up = (points.max(axis=0) / cell).astype(np.int64) + 1
     column, row = (points[ids] / cell).astype(np.int64).T
     start, places = grouped((row * n_across + column)[:, None], n_across * n_up)
-    return start, ids[places]
+    return Buckets(start, ids[places], int(n_across), cell)
 
 
 @verb
@@ -100,14 +109,12 @@ def _nearest_foreign(
     chain: Ints,
     corner: Ints,
     ids: Ints,
-    start: Ints,
-    items: Ints,
-    n_across: int,
-    cell: float,
+    buckets: Buckets,
     reach: float,
     bend: float,
     lfs: Floats,
 ) -> None:
+    start, n_across, cell = buckets.start, buckets.n_across, buckets.cell
     n_up = (len(start) - 1) // n_across
     rings = int(np.ceil(reach / cell))
     for i in ids:
@@ -126,7 +133,7 @@ def _nearest_foreign(
                     if k < 0 or k >= n_across:
                         continue
                     for at in range(start[r * n_across + k], start[r * n_across + k + 1]):
-                        j = items[at]
+                        j = buckets.items[at]
                         d2 = (points[j, 0] - x) ** 2 + (points[j, 1] - y) ** 2
                         if d2 >= best or (corner[i] >= 0 and corner[i] == corner[j]):
                             continue

@@ -13,6 +13,8 @@ curve take over, in a window half as wide again, which averages as much. A circl
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
@@ -26,17 +28,28 @@ _SLOPE = 0.5  # and change by this much a px of arc
 _SINGULAR = 1e-9  # least determinant of moments over the product of their diagonal: two samples fix no quadratic
 _WIDER = 1.5  # window of the quartic over that of the quadratic: the same noise
 _DETAIL, _WIDE = 6.5, 14.0  # px; windows below the one keep quadratics, above the other they get quartics
+_BELL = 0.47  # a sample at t half widths from the middle counts (1 - 0.47 t^2)^2: 0.28 at the end of a window
 _LEAST_PIVOT = 1e-9  # over the sum of weights
 _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are: regression would let them collapse
 
 
+class Samples(NamedTuple):
+    """What a curve is fitted to: points of the pixel boundary in their order along a chain."""
+
+    x: Floats
+    y: Floats
+    arc: Floats  #: length along the chain up to each point
+    weight: Floats  #: how well each point is known
+
+
 @verb
-def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats) -> float:
-    """Weighted sums within +-w of point i, with u = s - s[i] and x, y relative to it.
+def _sum_up(samples: Samples, i: int, w: float, sums: Floats) -> float:
+    """Weighted sums within +-w of point i, with u = arc - arc[i] and x, y relative to it.
 
     sums[0:5] of u^0..u^4, [5:8] of x, u x, u^2 x, [8:11] of y, u y, u^2 y, [11:14] of x x, x y, y y.
     Gives the sum of the bell alone, over the samples that count.
     """
+    x, y, s, q = samples.x, samples.y, samples.arc, samples.weight
     for k in range(14):
         sums[k] = 0.0
     count = 0.0
@@ -45,7 +58,7 @@ def _sum_up(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: 
         while 0 <= j < len(s) and abs(s[j] - s[i]) <= w:
             u, px, py = s[j] - s[i], x[j] - x[i], y[j] - y[i]
             t = u / w
-            g = 1.0 - 0.47 * t * t
+            g = 1.0 - _BELL * t * t
             g *= g
             count += g * (q[j] > 0.0)
             g *= q[j]
@@ -88,11 +101,9 @@ def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, fl
 
 
 @verb
-def quadratic_at(
-    x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, sums: Floats
-) -> tuple[float, float, float]:
+def quadratic_at(samples: Samples, i: int, w: float, sums: Floats) -> tuple[float, float, float]:
     """Fit around point i: its shift in x and in y, and the root mean square residual across the curve."""
-    count = _sum_up(x, y, s, q, i, w, sums)
+    count = _sum_up(samples, i, w, sums)
     x0, x1, x2 = _solve(sums, sums[5], sums[6], sums[7])
     y0, y1, y2 = _solve(sums, sums[8], sums[9], sums[10])
     xx = sums[11] - x0 * sums[5] - x1 * sums[6] - x2 * sums[7]
@@ -103,12 +114,13 @@ def quadratic_at(
 
 
 @verb
-def _quartic_at(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, a: Floats) -> tuple[float, float]:
+def _quartic_at(samples: Samples, i: int, w: float, a: Floats) -> tuple[float, float]:
     """Fit a quartic around point i: its shift in x and in y.
 
     Row r of the normal equations `a` is that of (u / w)^(4 - r), the right-hand sides of x and y are its last columns:
     what is left of the last row when the others are eliminated is the value at u = 0.
     """
+    x, y, s, q = samples.x, samples.y, samples.arc, samples.weight
     for r in range(5):
         for c in range(7):
             a[r, c] = 0.0
@@ -116,7 +128,7 @@ def _quartic_at(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, a:
         j = i if step == 1 else i - 1
         while 0 <= j < len(s) and abs(s[j] - s[i]) <= w:
             t = (s[j] - s[i]) / w
-            g = 1.0 - 0.47 * t * t
+            g = 1.0 - _BELL * t * t
             g *= g * q[j]
             for r in range(4, -1, -1):
                 a[r, 5] += g * (x[j] - x[i])
@@ -139,11 +151,9 @@ def _quartic_at(x: Floats, y: Floats, s: Floats, q: Floats, i: int, w: float, a:
 
 
 @verb
-def _choose_windows(
-    x: Floats, y: Floats, s: Floats, q: Floats, first: int, last: int, widest: float, windows: Floats, w: Floats
-) -> None:
+def _choose_windows(samples: Samples, first: int, last: int, widest: float, windows: Floats, w: Floats) -> None:
     """Half width of the window at points first..last of a piece, into w."""
-    sums = np.empty(14)
+    s, sums = samples.arc, np.empty(14)
     for k in range(first, last + _EVERY, _EVERY):
         i = min(k, last)
         w[i] = min(windows[0], widest)
@@ -151,7 +161,7 @@ def _choose_windows(
         for candidate in windows:
             if candidate > widest or (candidate > _DARING and failures > 1):
                 break
-            _, _, rms = quadratic_at(x, y, s, q, i, candidate, sums)
+            _, _, rms = quadratic_at(samples, i, candidate, sums)
             if rms <= STAIR_NOISE:
                 w[i] = candidate
                 failures = 0
@@ -168,42 +178,37 @@ def _choose_windows(
 
 
 @verb
-def _put_quadratics(
-    x: Floats, y: Floats, s: Floats, q: Floats, at: int, width: Floats, closed: bool, piece: Floats, sums: Floats
-) -> None:
+def _put_quadratics(samples: Samples, at: int, width: Floats, closed: bool, piece: Floats, sums: Floats) -> None:
     """Move the points of a piece, of which the first stands at `at`, to the values of their quadratics."""
     n = len(piece) - 1
     for j in range(0 if closed else 1, n):
-        dx, dy, _ = quadratic_at(x, y, s, q, at + j, width[j], sums)
-        piece[j, 0], piece[j, 1] = x[at + j] + dx, y[at + j] + dy
+        dx, dy, _ = quadratic_at(samples, at + j, width[j], sums)
+        piece[j, 0], piece[j, 1] = samples.x[at + j] + dx, samples.y[at + j] + dy
     if closed:
         piece[n, 0], piece[n, 1] = piece[0, 0], piece[0, 1]
 
 
 @verb
-def _put_quartics(
-    x: Floats, y: Floats, s: Floats, q: Floats, at: int, width: Floats, closed: bool, piece: Floats, matrix: Floats
-) -> None:
+def _put_quartics(samples: Samples, at: int, width: Floats, closed: bool, piece: Floats, matrix: Floats) -> None:
     """Move the points of a piece on to the values of quartics, where windows are wide."""
     n = len(piece) - 1
     for j in range(0 if closed else 1, n):
         share = min((width[j] - _DETAIL) / (_WIDE - _DETAIL), 1.0)
         if share > 0.0:
-            dx, dy = _quartic_at(x, y, s, q, at + j, _WIDER * width[j], matrix)
-            piece[j, 0] += share * (x[at + j] + dx - piece[j, 0])
-            piece[j, 1] += share * (y[at + j] + dy - piece[j, 1])
+            dx, dy = _quartic_at(samples, at + j, _WIDER * width[j], matrix)
+            piece[j, 0] += share * (samples.x[at + j] + dx - piece[j, 0])
+            piece[j, 1] += share * (samples.y[at + j] + dy - piece[j, 1])
     if closed:
         piece[n, 0], piece[n, 1] = piece[0, 0], piece[0, 1]
 
 
 @verb
-def _extend(
-    points: Floats, arc: Floats, weight: Floats, first: int, last: int, closed: bool, reach: float, out: Floats
-) -> int:
-    """Copy a piece into out (rows x, y, s, weight), `reach` more at both ends; give the place of its first point.
+def _extend(chain: Samples, first: int, last: int, closed: bool, reach: float, out: Samples) -> int:
+    """Copy a piece of a chain into `out`, `reach` more at both ends; give the place of its first point.
 
     A closed chain goes on round, an open piece by its own image turned about its end: the curve keeps its ends.
     """
+    x, y, arc = chain.x, chain.y, chain.arc
     n = last - first
     length = arc[last] - arc[first]
     before = 0
@@ -216,17 +221,16 @@ def _extend(
         at = k + before
         if closed:
             i = first + k % n
-            out[0, at], out[1, at], out[2, at] = points[i, 0], points[i, 1], arc[i] + length * (k // n)
+            out.x[at], out.y[at], out.arc[at] = x[i], y[i], arc[i] + length * (k // n)
         elif k < 0 or k > n:
             pin = first if k < 0 else last
             i = first - k if k < 0 else last - (k - n)
-            out[0, at], out[1, at] = 2 * points[pin, 0] - points[i, 0], 2 * points[pin, 1] - points[i, 1]
-            out[2, at] = 2 * arc[pin] - arc[i]
+            out.x[at], out.y[at], out.arc[at] = 2 * x[pin] - x[i], 2 * y[pin] - y[i], 2 * arc[pin] - arc[i]
         else:
             i = first + k
-            out[0, at], out[1, at], out[2, at] = points[i, 0], points[i, 1], arc[i]
-        out[3, at] = weight[i]
-    out[2, before + n + after + 1] = np.inf
+            out.x[at], out.y[at], out.arc[at] = x[i], y[i], arc[i]
+        out.weight[at] = chain.weight[i]
+    out.arc[before + n + after + 1] = np.inf
     return before
 
 
@@ -258,10 +262,12 @@ def fit_pieces(points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed
     longest = 0
     for k in range(len(pieces)):
         longest = max(longest, pieces[k, 1] - pieces[k, 0])
-    out = np.empty((4, 3 * longest + 4))
-    w = np.empty(3 * longest + 4)
+    room = 3 * longest + 4
+    samples = Samples(np.empty(room), np.empty(room), np.empty(room), np.empty(room))
+    w = np.empty(room)
     width = np.empty(longest + 1)
     true_arc = np.empty(len(points))
+    x, y = points[:, 0].copy(), points[:, 1].copy()
     sums, matrix = np.empty(14), np.empty((5, 7))
     for k in range(len(pieces)):
         first, last = pieces[k, 0], pieces[k, 1]
@@ -270,20 +276,19 @@ def fit_pieces(points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed
         widest = min(length / 4 if closed[k] else length / 2, windows[-1])
         if (closed[k] and n < _SHORTEST_LOOP) or widest < 1.0:
             continue
-        at = _extend(points, arc, weight, first, last, closed[k], widest, out)
-        x, y, s, q = out[0], out[1], out[2], out[3]
-        _choose_windows(x, y, s, q, at, at + n, widest, windows, w)
+        at = _extend(Samples(x, y, arc, weight), first, last, closed[k], widest, samples)
+        _choose_windows(samples, at, at + n, widest, windows, w)
         widest_chosen = 0.0
         for j in range(n + 1):
             width[j] = w[at + j]
             widest_chosen = max(widest_chosen, width[j])
         piece = fitted[first : last + 1]
-        _put_quadratics(x, y, s, q, at, width, closed[k], piece, sums)
+        _put_quadratics(samples, at, width, closed[k], piece, sums)
         if widest_chosen > _DETAIL:
             true_arc[first] = 0.0
             for j in range(n):
                 step = np.hypot(piece[j + 1, 0] - piece[j, 0], piece[j + 1, 1] - piece[j, 1])
                 true_arc[first + j + 1] = true_arc[first + j] + step
-            at = _extend(points, true_arc, weight, first, last, closed[k], _WIDER * widest, out)
-            _put_quartics(x, y, s, q, at, width, closed[k], piece, matrix)
+            at = _extend(Samples(x, y, true_arc, weight), first, last, closed[k], _WIDER * widest, samples)
+            _put_quartics(samples, at, width, closed[k], piece, matrix)
     return fitted

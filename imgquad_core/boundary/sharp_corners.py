@@ -12,7 +12,7 @@ from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.jit import kernel, verb
 
 from .curves import Curves, line_beside, started_at
-from .fitting import quadratic_at
+from .fitting import Samples, quadratic_at
 
 _SIDE = 6.0  # px of arc of each side
 _SIDES = np.array([_SIDE, 26.0, 18.0, 12.0, 8.5, _SIDE])  # a first look; then the longest that are straight tell
@@ -22,6 +22,7 @@ _TURN, _TIP = 0.8, 2.5  # radians, least and largest turn between the sides; bey
 _UNLIKE = 0.20  # px, least residual of one quadratic through both sides
 _FARTHEST = 2.0  # px from the pixel boundary
 _APART = 4.2  # px of arc between corners
+_MOST = 99  # samples on both sides of a point: these are half a pixel apart or more
 _AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
 
 
@@ -95,7 +96,7 @@ def _mark_side(curves: Curves, c: int, i: int, step: int, is_corner: Flags, corn
 def _find(curves: Curves, lengths: Floats) -> Flags:
     score = np.zeros(len(curves.raw))
     is_corner = np.zeros(len(curves.raw), np.bool_)
-    x, y, s, q, sums = np.empty(99), np.empty(99), np.empty(99), np.full(99, 1.0), np.empty(14)
+    beside, sums = Samples(np.empty(_MOST), np.empty(_MOST), np.empty(_MOST), np.full(_MOST, 1.0)), np.empty(14)
     for c in range(len(curves.ends)):
         if curves.is_frame[c]:
             continue
@@ -104,8 +105,8 @@ def _find(curves: Curves, lengths: Floats) -> Flags:
             straight, dx, dy = _corner_at(curves, c, i, lengths)
             if straight <= 0.0:
                 continue
-            middle = _gather(curves, c, i, x, y, s)
-            gain = quadratic_at(x, y, s, q, middle, _SIDE, sums)[2]
+            middle = _gather(curves, c, i, beside)
+            gain = quadratic_at(beside, middle, _SIDE, sums)[2]
             if gain >= _UNLIKE:
                 j = _nearest(curves, c, i, curves.raw[i, 0] + dx, curves.raw[i, 1] + dy)
                 score[j] = max(score[j], gain + straight)
@@ -145,7 +146,7 @@ def _turn(ux: float, uy: float, vx: float, vy: float) -> float:
 
 
 @verb
-def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> int:
+def _gather(curves: Curves, c: int, i: int, out: Samples) -> int:
     """Copy the points around i; gives the place of i among them."""
     first, last = curves.offsets[c], curves.offsets[c + 1] - 1
     low = high = i
@@ -159,9 +160,9 @@ def _gather(curves: Curves, c: int, i: int, x: Floats, y: Floats, s: Floats) -> 
     n, length = last - first, curves.arc[last]
     for k in range(low, high + 1):
         j = first + (k - first) % n if curves.ends[c, 0] < 0 else k
-        x[k - low], y[k - low] = curves.raw[j, 0], curves.raw[j, 1]
-        s[k - low] = curves.arc[j] + (length * ((k - first) // n) if curves.ends[c, 0] < 0 else 0.0)
-    s[high - low + 1] = np.inf
+        out.x[k - low], out.y[k - low] = curves.raw[j, 0], curves.raw[j, 1]
+        out.arc[k - low] = curves.arc[j] + (length * ((k - first) // n) if curves.ends[c, 0] < 0 else 0.0)
+    out.arc[high - low + 1] = np.inf
     return i - low
 
 
