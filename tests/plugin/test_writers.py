@@ -145,7 +145,7 @@ def test_meshio_reads_plain_grids(tmp_path: Path, extension: str, options: Eleme
     assert (block.data == mesh.cells).all()
     assert np.abs(read.points[:, :2] - mesh.points[:, :2]).max() < 1e-9
     for name in ("material", "mat_id"):
-        assert (read.cell_data[name][0] == mesh.cell_material + 1).all()
+        assert (read.cell_data[name][0].ravel() == mesh.cell_material + 1).all()
     for name, ids in mesh.node_sets.items():
         assert (np.flatnonzero(read.point_data[f"set_{name}"]) == ids).all()
     grid = pv.read(tmp_path / f"a{extension}")
