@@ -208,12 +208,12 @@ def test_open_interfaces_have_two_sides_in_any_format(tmp_path: Path, order: int
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_material_twice_is_cut_between_all_its_elements(order: int) -> None:
     whole = three(order)
-    mesh = split_interfaces(whole, [("iron", "iron"), ("air", "iron")])
+    mesh = split_interfaces(whole, [("iron", "iron"), ("air", "iron"), ("clay", "iron")])
     iron = np.flatnonzero(mesh.cell_material == 2)
     assert len(np.unique(mesh.cells[iron][:, :4])) == 4 * len(iron)  # no two share a node
     inside = (mesh.cohesive_pair == 2).all(axis=1)
     assert inside.sum() == 10  # of 4 x 2 quads: 4 + 6 inner sides
-    assert set(mesh.cohesive_cells()) == {"cohesive_air_iron", "cohesive_iron_iron"}
+    assert set(mesh.cohesive_cells()) == {"cohesive_air_iron", "cohesive_clay_iron", "cohesive_iron_iron"}
     p = mesh.points[mesh.cohesive]
     assert (p[:, 0] == p[:, 3]).all()
     assert (p[:, 1] == p[:, 2]).all()
