@@ -112,14 +112,15 @@ def test_16_bit_colours_are_told_apart_by_all_their_bits() -> None:
     assert image.materials.colors[2].tolist() == [234, 0, 0]
 
 
-def test_auto_is_exact_up_to_32_colours_and_labels_always() -> None:
+def test_exact_takes_every_value_and_a_number_those_that_are_there() -> None:
     ramp = np.arange(33, dtype=np.uint8)[None, :].repeat(5, axis=0)
     assert not segment_picture(ramp[:, :32]).quantised
     assert segment_picture(ramp).quantised
+    assert segment_picture(ramp).warnings  # too few pixels to tell
     assert not segment_picture(ramp, SegmentationOptions("exact")).quantised
     assert (segment(ramp.astype(np.int32)).labels == ramp).all()
     many = np.arange(90_000).reshape(300, 300)
-    assert (segment(many).labels == many).all()
+    assert (segment(many, SegmentationOptions("exact")).labels == many).all()
     rgb = np.stack([many % 256, many // 256 % 256, many % 7], axis=2).astype(np.uint8)
     exact = segment(rgb, SegmentationOptions("exact"))
     assert (exact.materials.colors[exact.labels] == rgb).all()
@@ -157,10 +158,14 @@ def test_values_that_cannot_be_material_numbers_are_refused() -> None:
         segment(np.array([[-2, 3]]))
     with pytest.raises(InputError, match="4294967295"):
         segment(np.array([[0, 2**32 - 1]], np.uint32))
-    with pytest.raises(InputError, match="whole numbers"):
-        segment(np.array([[0.5, 1.5]]), SegmentationOptions("exact"))
     with pytest.raises(InputError, match="holds labels"):
-        segment(np.array([[0, 1]]), SegmentationOptions(3))
+        segment(Picture(np.array([[0, 1]]), labels=True), SegmentationOptions(3))
+
+
+def test_values_that_are_not_whole_are_numbered_from_the_smallest() -> None:
+    image = segment(np.array([[1.5, -0.5], [0.25, 1.5]]))
+    assert image.labels.tolist() == [[2, 0], [1, 2]]
+    assert image.materials.names == ("value -0.5", "value 0.25", "value 1.5")
 
 
 @pytest.mark.parametrize("bad", ["many", 0, -3, 257, True, [[1, 2]], [[0, 0, 300]], []])
@@ -329,6 +334,8 @@ def test_classes_are_as_many_as_there_are_clusters(n: int, dimension: int) -> No
     middles = np.linspace(20, 230, n)[:, None] if dimension == 1 else 50 + random.permutation(n)[:, None] * (20, 0, 0)
     points = np.concatenate([random.normal(m, 2.5, (600, dimension)) for m in middles]).clip(0, 255)
     levels, weights = np.unique(np.rint(points), axis=0, return_counts=True)
+    if dimension == 1:  # a bin a level
+        weights, levels = np.bincount(points.round().astype(int).ravel(), minlength=256), np.arange(256.0)[:, None]
     empty = np.zeros((1, 1), np.int32)
     found = classes_of(Histogram(empty, empty.ravel(), levels, weights.astype(float)))
     assert len(found.means) == n
