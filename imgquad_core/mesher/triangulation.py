@@ -21,7 +21,8 @@ from .triangulators import triangulator_used
 LONGEST = 1.2  # length wanted far from constraints, over the root of the largest area; an edge of it has 1.52
 GRADING = 0.35  # growth of the length wanted, per unit of length
 LEAST_ROOM = 0.7  # distance of a new point to the corners of its triangle, over the length wanted there
-REFINEMENTS = 12  # rounds at most; four or five are usual
+REFINEMENTS = 12  # rounds at most; two or three are usual
+FEW = 0.03  # new points, over those there are, for which no other round is made: a half of all rounds
 
 
 class Constraints(NamedTuple):
@@ -158,7 +159,7 @@ def _refined_by_cdt(points: Floats, segments: Ints, max_area: float) -> Triangle
     mesh = _by_cdt(points, segments)
     for _ in range(REFINEMENTS):
         new, wanted_there = _points_missing(mesh, wanted, longest)
-        if len(new) == 0:
+        if len(new) <= FEW * len(mesh.points):
             break
         wanted = np.append(wanted, wanted_there)
         mesh = _by_cdt(np.vstack([mesh.points, new]), segments)
