@@ -25,6 +25,8 @@ RIM, RIM_OF_NOISE = 16.0, 16.0
 SLOPE, OF_COLOUR = 2.0, 1.7
 #: shading is taken out if it ranges over more standard deviations of the noise, and separates classes better so much
 SHADED, BETTER = 2.0, 1.25
+#: constants count if at least so much of the picture is flat beside them
+LEFT = 0.05
 #: a pixel so far from another class towards its own keeps it, whatever is around it
 CLEAR = 0.7
 
@@ -107,14 +109,9 @@ def find_classes(levels: Levels, number: int | None = None, flatten: bool = True
     -----
     See `imgquad_core.picture.segmentation.segment` for the steps.
     """
-    noise = noise_of(levels)
-    constants = constants_of(levels, noise) if levels.is_grey else []
-    constants = constants if number is None else constants[: number - 1]
-    fixed = _united(constants)
-    if fixed is not None:
-        noise = noise_of(levels, fixed)
+    constants, noise, smooth = _without_constants(levels, number)
     wanted = None if number is None else number - len(constants)
-    choice = _chosen(levels, smoothed(levels, noise, fixed), wanted)
+    choice = _chosen(levels, smooth, wanted)
     if flatten and levels.is_grey and not constants:
         choice = _flattened(choice, noise, wanted)
     means = choice.classes.means
@@ -124,6 +121,21 @@ def find_classes(levels: Levels, number: int | None = None, flatten: bool = True
     means = np.concatenate([means, np.reshape(tails, (-1, 1))]) if tails else means
     means = means[_by_light(means)]
     return _labelled(choice, means, constants, noise, len(tails))
+
+
+def _without_constants(levels: Levels, number: int | None) -> tuple[list[Constant], float, Smooth]:
+    """Return the constants, the noise of all else, and the picture without noise; constants are no support."""
+    noise = noise_of(levels)
+    constants = constants_of(levels, noise) if levels.is_grey else []
+    constants = constants if number is None else constants[: number - 1]
+    if constants:
+        fixed = np.logical_or.reduce([constant.pixels for constant in constants])
+        noise_inside = noise_of(levels, fixed)
+        smooth = smoothed(levels, noise_inside, fixed)
+        if np.count_nonzero(smooth.support) >= LEFT * fixed.size:
+            return constants, noise_inside, smooth
+        # a drawing in flat greys: they are its classes
+    return [], noise, smoothed(levels, noise, None)
 
 
 def find_nearest(levels: Levels, palette: Floats) -> Found:
@@ -147,17 +159,15 @@ def smoothed(levels: Levels, noise: float, without: Flags | None) -> Smooth:
     for pixels in (levels.void, without):
         if pixels is not None:
             support &= ~pixels
-    if not support.any():  # noise or slopes all over
-        support = np.ones(levels.shape, np.bool_) if levels.void is None else ~levels.void
     return Smooth(plane, rims, support)
 
 
-def _united(constants: list[Constant]) -> Flags | None:
-    return np.logical_or.reduce([c.pixels for c in constants]) if constants else None
-
-
 def _chosen(levels: Levels, smooth: Smooth, number: int | None) -> Choice:
-    return Choice(levels, smooth, classes_of(histogram_of(smooth.plane, smooth.support), number))
+    """Find the classes of the support, of all pixels where there are noise or slopes all over."""
+    support = smooth.support
+    if not support.any():
+        support = np.ones(levels.shape, np.bool_) if levels.void is None else ~levels.void
+    return Choice(levels, smooth, classes_of(histogram_of(smooth.plane, support), number))
 
 
 def _flattened(choice: Choice, noise: float, number: int | None) -> Choice:
