@@ -47,13 +47,21 @@ class Materials:
         Name of each material, in the order of `labels`.
     colors : array_like of uint8, shape (n, 3)
         RGB of each material, in the order of `labels`.
+    phases : tuple of str, optional
+        Phase of each material that is a grain, in the order of `labels`; empty for others.
+    orientations : array_like of float64, shape (n, 3), optional
+        Bunge's Euler angles (phi1, Phi, phi2) of each grain's crystal, degrees; NaN where unknown.
     """
 
     labels: Labels
     names: tuple[str, ...]
     colors: Bytes
+    phases: tuple[str, ...] | None = None
+    orientations: Floats | None = None
 
     def __post_init__(self) -> None:
+        if self.orientations is not None:
+            object.__setattr__(self, "orientations", _frozen(self.orientations, np.float64, 2))
         object.__setattr__(self, "labels", _frozen(self.labels, np.int32, 1))
         object.__setattr__(self, "names", tuple(self.names))
         object.__setattr__(self, "colors", _frozen(np.reshape(self.colors, (-1, 3)), np.uint8, 2))
@@ -227,6 +235,10 @@ class QuadMesh:
     def scaled(self, factor: float | tuple[float, float]) -> QuadMesh:
         """Return the same mesh with all coordinates times `factor`, or x and y each times its own."""
         return replace(self, points=self.points * factor)
+
+    def moved(self, by: tuple[float, float]) -> QuadMesh:
+        """Return the same mesh moved by x and y."""
+        return replace(self, points=self.points + by)
 
 
 def chain_segments(offsets: Ints, points: Ints) -> Ints:

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import picture
 from .boundary import ExtractionOptions, SmoothingOptions
-from .declared import Declaration, check, option, same_as
+from .declared import check, option, same_as
 from .errors import InputError
 from .mesher import EFFORTS, MeshingOptions
-from .picture import DenoiseOptions, ReadOptions, SegmentationOptions
+from .picture import (
+    Calibration,
+    DenoiseOptions,
+    ReadOptions,
+    SegmentationOptions,
+    asked_placement,
+    assert_placement,
+)
 
 if TYPE_CHECKING:
     from .model import Materials
     from .picture import Box
-
-_SIDE = Declaration(1.0, "", float, above=0.0)
 
 
 @dataclass(frozen=True)
@@ -56,17 +61,24 @@ class MeshOptions:
         Largest ratio of the lengths of neighbouring edges on a boundary.
     max_shift : float
         How far smoothing moves a boundary at most.
-    pixel_size : float or (float, float)
+    pixel_size : float, (float, float), "auto", "file" or "file:UNIT"
         Length of a pixel in the unit of the mesh; width and height where they differ. Lengths in pixels then mean the
-        shorter side.
+        shorter side. "file": what the file says, in its own unit or in another; "auto": that of a map (GeoTIFF in a
+        projected reference system), else 1.
+    origin : (float, float), "auto" or "file"
+        Place of the lower left corner of what is meshed. "auto": that of a map whose pixel size is taken, else 0, 0.
     drop : sequence of str or int
         Materials that are left out: their boundary becomes a free border.
     drop_transparent : bool
         Whether pixels of alpha 0 are left out too.
     crop : tuple of int, optional
         Left, upper, right, lower bound of the part that is meshed, from the picture's upper left corner.
-    frame : int, optional
-        Which picture of a stack, counted from 0.
+    frame, channel, level, scalars
+        Which picture of a file that holds several; see `ReadOptions`.
+    info_bar : "keep" or "crop"
+        What becomes of the bar with text below an electron micrograph.
+    grain_angle : float
+        Of an EBSD map: disorientation from which neighbours belong to two grains, degrees.
     periodic : "none", "x", "y" or "xy"
         Opposite sides get nodes at the same places, for a periodic cell; see `match_opposite_sides`.
     max_pixels : int
@@ -109,12 +121,20 @@ class MeshOptions:
     policy: str = same_as(ExtractionOptions, "policy")
     edge_ratio: float = same_as(SmoothingOptions, "edge_ratio")
     max_shift: float = same_as(SmoothingOptions, "max_shift")
-    pixel_size: float | tuple[float, float] = option(
-        1.0,
-        "length of a pixel in the unit of the mesh; width and height where they differ (sizes in pixels then mean the "
-        "shorter side)",
+    pixel_size: float | tuple[float, float] | str = option(
+        "auto",
+        "length of a pixel in the unit of the mesh, width and height where they differ (sizes in pixels then mean the "
+        "shorter side); file: what the file says, file:mm: the same in millimetres; auto: that of a map in a projected "
+        "reference system, else 1",
         kind=object,
-        told="1",
+        told="auto",
+    )
+    origin: tuple[float, float] | str = option(
+        "auto",
+        "place of the lower left corner of what is meshed; file: what the file says; auto: that of a map whose pixel "
+        "size is taken, else 0,0",
+        kind=object,
+        told="auto",
     )
     drop: tuple[str | int, ...] = option(
         (), "materials that are left out, by name or number: their boundary becomes a free border", topic="picture"
@@ -131,6 +151,11 @@ class MeshOptions:
         choices=("none", "x", "y", "xy"),
     )
     frame: int | None = same_as(ReadOptions, "frame")
+    channel: int | None = same_as(ReadOptions, "channel")
+    level: int = same_as(ReadOptions, "level")
+    scalars: str | None = same_as(ReadOptions, "scalars")
+    info_bar: str = same_as(ReadOptions, "info_bar")
+    grain_angle: float = same_as(ReadOptions, "grain_angle")
     max_pixels: int = same_as(ReadOptions, "max_pixels")
     effort: str = same_as(MeshingOptions, "effort")
     threads: int = same_as(MeshingOptions, "threads")
@@ -138,8 +163,7 @@ class MeshOptions:
 
     def __post_init__(self) -> None:
         check(self)
-        if not all(_SIDE.allows(side) for side in self.pixel_sides):
-            raise InputError(f"pixel_size is {self.pixel_size!r}; give a length above 0, or a width and a height")
+        assert_placement(self.pixel_size, self.origin)
         if self.crop is not None and not _is_box(self.crop):
             raise InputError(f"crop is {self.crop!r}; give left, upper, right and lower bound in whole pixels")
         dropped: object = self.drop
@@ -149,14 +173,47 @@ class MeshOptions:
         self.meshing(None)
         self.smoothing(None)
         self.segmentation()
-        ReadOptions(self.max_pixels, self.frame)
+        self.reading()
         ExtractionOptions(self.policy)
 
     @property
     def pixel_sides(self) -> tuple[float, float]:
-        """Width and height of a pixel, in the unit of the mesh."""
-        sides = self.pixel_size
-        return (sides[0], sides[1]) if isinstance(sides, (tuple, list)) and len(sides) == 2 else (sides, sides)
+        """Width and height of a pixel, in the unit of the mesh: of options that were `placed`, or that gave them."""
+        size = self.pixel_size
+        if isinstance(size, str):
+            return 1.0, 1.0
+        return (size[0], size[1]) if isinstance(size, (tuple, list)) else (size, size)
+
+    @property
+    def corner(self) -> tuple[float, float]:
+        """The origin as numbers: of options that were `placed`, or that gave them."""
+        return (0.0, 0.0) if isinstance(self.origin, str) else self.origin
+
+    def placed(self, found: Calibration, name: str) -> MeshOptions:
+        """Return the options with the numbers that "auto" and "file" stand for.
+
+        Parameters
+        ----------
+        found : Calibration
+            What the file says of the part that is meshed.
+        name : str
+            What to call the picture.
+        """
+        size, origin = asked_placement(self.pixel_size, self.origin, found, name)
+        return replace(self, pixel_size=size, origin=origin)
+
+    def reading(self) -> ReadOptions:
+        """Return the options of reading a file."""
+        return ReadOptions(
+            max_pixels=self.max_pixels,
+            frame=self.frame,
+            channel=self.channel,
+            level=self.level,
+            scalars=self.scalars,
+            info_bar=self.info_bar,
+            grain_angle=self.grain_angle,
+            crop=self.crop,
+        )
 
     def segmentation(self) -> SegmentationOptions:
         """Return the options of segmentation."""

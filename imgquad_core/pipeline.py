@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from types import MappingProxyType
@@ -29,22 +29,28 @@ from .mesher import MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .options import MeshOptions
 from .picture import (
+    Box,
+    Calibration,
     DenoiseOptions,
     Picture,
     ReadOptions,
     Removal,
     Segmentation,
+    SegmentationOptions,
+    as_told,
     assert_solid,
     crop_image,
     drop_materials,
     list_removed,
+    picture_of,
     read_picture,
     remove_noise,
     segment_picture,
+    size_note,
     sizes_by_number,
 )
 
-Source: TypeAlias = "str | Path | NDArray[Any] | LabelImage"
+Source: TypeAlias = "str | Path | NDArray[Any] | LabelImage | Picture"
 #: called with the name of the stage that starts, its number from 0, and the number of stages
 Progress: TypeAlias = Callable[[str, int, int], None]
 STAGES = ("read", "segment", "denoise", "boundary", "smooth", "mesh")
@@ -59,7 +65,7 @@ class Run:
     Parameters
     ----------
     options : MeshOptions
-        As asked.
+        As asked; pixel size and origin are numbers.
     segmentation : Segmentation
         The picture as segmented, and what was chosen.
     picture : LabelImage
@@ -81,6 +87,10 @@ class Run:
         The same in the unit of `options.pixel_size`.
     seconds : mapping of str to float
         Time of each of `STAGES` that was needed.
+    calibration : Calibration
+        What the file says of pixel size and place.
+    notes : tuple of str
+        What the reader chose or found, in words.
     """
 
     options: MeshOptions
@@ -95,6 +105,8 @@ class Run:
     pixel_mesh: QuadMesh
     mesh: QuadMesh
     seconds: Mapping[str, float]
+    calibration: Calibration = field(default_factory=Calibration)
+    notes: tuple[str, ...] = ()
 
 
 def mesh_image(image: Source, options: MeshOptions | None = None) -> QuadMesh:
@@ -102,16 +114,17 @@ def mesh_image(image: Source, options: MeshOptions | None = None) -> QuadMesh:
 
     Parameters
     ----------
-    image : array_like, LabelImage or path
+    image : array_like, LabelImage, Picture or path
         The picture, row 0 on top: integer labels or greys (rows, columns), colours (rows, columns, 3 or 4), a
-        `LabelImage`, or a file.
+        `LabelImage`, what `read_picture` gave, or a file.
     options : MeshOptions, optional
         How it is meshed.
 
     Returns
     -------
     QuadMesh
-        Convex, counter-clockwise quads on [0, columns] x [0, rows] times `options.pixel_size`, y up.
+        Convex, counter-clockwise quads on [0, columns] x [0, rows] times `options.pixel_size`, y up, from
+        `options.origin` on.
 
     Raises
     ------
@@ -136,7 +149,7 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
 
     Parameters
     ----------
-    source : array_like, LabelImage, path or Segmentation
+    source : array_like, LabelImage, Picture, path or Segmentation
         As for `mesh_image`; a picture that is segmented already is taken as it is.
     options : MeshOptions, optional
         As for `mesh_image`.
@@ -146,8 +159,12 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
     ahead.start()
     options = options or MeshOptions()
     timed = _Stopwatch(progress)
-    found = source if isinstance(source, Segmentation) else _segmented(source, options, timed)
-    picture = crop_image(found.image, options.crop) if options.crop else found.image
+    raw = source if isinstance(source, Segmentation) else _read(source, options, timed)
+    found = raw if isinstance(raw, Segmentation) else _segmented(raw, options, timed)
+    crop = None if isinstance(raw, Picture) and raw.window else options.crop  # what was read may be the part already
+    picture = crop_image(found.image, crop) if crop else found.image
+    calibration, notes = _what_the_file_says(raw, crop, options)
+    options = options.placed(calibration, raw.name if isinstance(raw, Picture) else "the picture")
     noise = options.noise(found.quantised, found.image.shape)
     with timed("denoise"):
         clean = remove_noise(picture, noise)
@@ -172,16 +189,24 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
         boundary=boundary,
         square=true.square,
         pixel_mesh=mesh,
-        mesh=mesh.scaled(true.square) if true.square != (1.0, 1.0) else mesh,
+        mesh=_placed(mesh, true.square, options.corner),
         seconds=MappingProxyType(timed.seconds),
+        calibration=calibration,
+        notes=notes,
     )
 
 
-def read_source(source: Source, options: ReadOptions | None = None) -> Picture | NDArray[Any] | LabelImage:
-    """Return the picture that a path names; arrays and `LabelImage` as they are."""
+def read_source(source: Source, options: ReadOptions | None = None) -> Picture | LabelImage:
+    """Return the picture that a path names or an array holds; a `Picture` or `LabelImage` as it is."""
     if isinstance(source, (str, Path)):
         return read_picture(source, options)
-    return source if isinstance(source, LabelImage) else np.asanyarray(source)
+    return source if isinstance(source, (LabelImage, Picture)) else picture_of(source)
+
+
+def segment_source(raw: Picture | LabelImage, options: SegmentationOptions | None = None) -> Segmentation:
+    """Segment what `read_source` gave; names, crystals and void of its file stay."""
+    found = segment_picture(raw, options)
+    return replace(found, image=as_told(found.image, raw)) if isinstance(raw, Picture) else found
 
 
 def extract(labels: LabelImage, options: ExtractionOptions | None = None) -> BoundaryGraph:
@@ -261,11 +286,30 @@ class _Stopwatch:
         self.seconds[stage] = perf_counter() - start
 
 
-def _segmented(source: Source, options: MeshOptions, timed: _Stopwatch) -> Segmentation:
+def _read(source: Source, options: MeshOptions, timed: _Stopwatch) -> Picture | LabelImage:
     with timed("read"):
-        raw = read_source(source, ReadOptions(options.max_pixels, options.frame))
+        return read_source(source, options.reading())
+
+
+def _segmented(raw: Picture | LabelImage, options: MeshOptions, timed: _Stopwatch) -> Segmentation:
     with timed("segment"):
-        return segment_picture(raw, options.segmentation())
+        return segment_source(raw, options.segmentation())
+
+
+def _what_the_file_says(
+    raw: Picture | LabelImage | Segmentation, crop: Box | None, options: MeshOptions
+) -> tuple[Calibration, tuple[str, ...]]:
+    """Return pixel size and place of the part that is meshed, and what the reader tells."""
+    if not isinstance(raw, Picture):
+        return Calibration(), ()
+    calibration = raw.calibration.cropped(crop, raw.shape[0]) if crop else raw.calibration
+    told = size_note(calibration, options.pixel_size)
+    return calibration, (*raw.notes, told) if told else raw.notes
+
+
+def _placed(mesh: QuadMesh, square: tuple[float, float], corner: tuple[float, float]) -> QuadMesh:
+    mesh = mesh.scaled(square) if square != (1.0, 1.0) else mesh
+    return mesh.moved(corner) if corner != (0.0, 0.0) else mesh
 
 
 def _assert_feasible(shape: tuple[int, int], size: float) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+SAMPLES = Path(os.environ.get("IMGQUAD_SAMPLES", ROOT.parent / "shared" / "samples"))
 IMAGES = Path(os.environ.get("IMGQUAD_IMAGES", ROOT.parent / "shared" / "images"))
 
 
@@ -35,3 +36,11 @@ def images() -> Path:
     if not IMAGES.is_dir():
         pytest.skip(f"real pictures not found: no folder {IMAGES} (set IMGQUAD_IMAGES)")
     return IMAGES
+
+
+@pytest.fixture(scope="session")
+def samples() -> Path:
+    """Folder of real files of instruments and programs; the test is skipped, visibly, where there is none."""
+    if not SAMPLES.is_dir():
+        pytest.skip(f"real files not found: no folder {SAMPLES} (set IMGQUAD_SAMPLES)")
+    return SAMPLES

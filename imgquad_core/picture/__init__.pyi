@@ -1,20 +1,29 @@
+from .calibration import Calibration, PixelSize, asked_placement, assert_placement, size_note
 from .marks import Marks, marks_of
+from .naming import as_told
 from .noise import Removal, automatic_limits, list_removed, remove_noise
 from .options import DenoiseOptions, ReadOptions, SegmentationOptions
-from .picture import Picture, picture_of
-from .reading import read_picture
+from .picture import Crystal, Picture, picture_of
+from .reading import FORMATS, read_picture
 from .segmentation import Segmentation, segment_picture
 from .selection import Box, assert_solid, crop_image, drop_materials, material_number, sizes_by_number
 
 __all__ = [
+    "FORMATS",
     "Box",
+    "Calibration",
+    "Crystal",
     "DenoiseOptions",
     "Marks",
     "Picture",
+    "PixelSize",
     "ReadOptions",
     "Removal",
     "Segmentation",
     "SegmentationOptions",
+    "as_told",
+    "asked_placement",
+    "assert_placement",
     "assert_solid",
     "automatic_limits",
     "crop_image",
@@ -26,5 +35,6 @@ __all__ = [
     "read_picture",
     "remove_noise",
     "segment_picture",
+    "size_note",
     "sizes_by_number",
 ]

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imgquad_core.arrays import Bytes, Flags
 from imgquad_core.errors import InputError
+
+from .calibration import Box, Calibration
+
+
+class Crystal(NamedTuple):
+    """What a grain is made of and how its crystal lies."""
+
+    phase: str
+    euler: tuple[float, float, float]  #: Bunge's phi1, Phi, phi2, degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +33,7 @@ class Picture:
     palette : uint8, shape (n, 3), optional
         RGB of the palette that `values` are indices of.
     opaque : bool, shape (n_rows, n_cols), optional
-        False where the pixel is wholly transparent (alpha 0). None: all are opaque.
+        False where the pixel is transparent (less than half of full alpha). None: all are opaque.
     labels : bool
         Whether the format says that `values` are material numbers; else the pixels are judged.
     void : bool, shape (n_rows, n_cols), optional
@@ -33,6 +42,16 @@ class Picture:
         Names of material numbers, such as phases; others are named by their number.
     name : str
         What to call the picture in messages.
+    calibration : Calibration
+        Pixel size and place, as far as the file knows them.
+    notes : tuple of str
+        What the reader chose or found, in words.
+    window : tuple of int, optional
+        Left, upper, right, lower bound of the part of the file's picture that this is. None: the whole.
+    crystals : mapping of int to Crystal, optional
+        Phase and orientation of material numbers that are grains.
+    bar_rows : int
+        Rows at the bottom that the file says are no part of the picture (text below an electron micrograph).
     """
 
     values: NDArray[Any]
@@ -42,6 +61,11 @@ class Picture:
     name: str = "the array"
     void: Flags | None = None
     names: Mapping[int, str] | None = None
+    calibration: Calibration = field(default_factory=Calibration)
+    notes: tuple[str, ...] = ()
+    window: Box | None = None
+    crystals: Mapping[int, Crystal] | None = None
+    bar_rows: int = 0
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -52,6 +76,19 @@ class Picture:
     def is_grey(self) -> bool:
         """Whether pixels hold one number that is no palette index."""
         return self.values.ndim == 2 and self.palette is None
+
+
+def part_of(picture: Picture, box: Box) -> Picture:
+    """Return the part of a picture within a box: left, upper, right, lower bound."""
+    left, upper, right, lower = box
+
+    def cut(array: NDArray[Any] | None) -> Any:
+        return None if array is None else np.ascontiguousarray(array[upper:lower, left:right])
+
+    return replace(
+        picture, values=cut(picture.values), opaque=cut(picture.opaque), void=cut(picture.void),
+        calibration=picture.calibration.cropped(box, picture.shape[0]),
+    )  # fmt: skip
 
 
 def picture_of(array: ArrayLike, name: str = "the array") -> Picture:
@@ -69,7 +106,7 @@ def picture_of(array: ArrayLike, name: str = "the array") -> Picture:
     Returns
     -------
     Picture
-        Pixels with alpha 0 are marked as not opaque.
+        Pixels with less than half of full alpha are marked as not opaque.
 
     Raises
     ------
@@ -92,9 +129,7 @@ def picture_of(array: ArrayLike, name: str = "the array") -> Picture:
         values = values.copy()
         values[void] = values[~void][0]
     channels = values.shape[2] if values.ndim == 3 else 1
-    opaque = values[..., -1] > 0 if channels in (2, 4) else None
-    if opaque is not None and opaque.all():
-        opaque = None
+    opaque = _opaque(values[..., -1]) if channels in (2, 4) else None
     if channels >= 3:
         return Picture(_as_rgb(values[..., :3], name), None, opaque, name=name, void=void)
     grey = values if values.ndim == 2 else values[..., 0]
@@ -110,6 +145,18 @@ def _void_of(mask: Any, values: NDArray[Any], name: str) -> Flags | None:
     if void.all():
         raise InputError(f"{name} holds no finite number that is not masked: give at least one")
     return void if void.any() else None
+
+
+def _opaque(alpha: NDArray[Any]) -> Flags | None:
+    """Return where alpha is at least half: the middle of a soft edge, as anti-aliasing draws it."""
+    if alpha.dtype.kind == "f":
+        full = 1.0 if alpha.max() <= 1 else 255.0
+    elif alpha.dtype.kind == "b" or alpha.max() <= 1:
+        full = 1.0
+    else:
+        full = 65535.0 if alpha.dtype == np.uint16 or alpha.max() > 255 else 255.0
+    opaque = alpha >= full / 2
+    return None if opaque.all() else opaque
 
 
 def _as_rgb(values: NDArray[Any], name: str) -> NDArray[Any]:

@@ -1,25 +1,82 @@
-"""Pictures from files, through Pillow, tifffile and NumPy."""
+"""Pictures from files: one table of formats, one reader each."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from imgquad_core.errors import InputError
 
+from .ebsd_maps import read_ang, read_ctf
+from .hdf5_files import read_hdf5
+from .info_bar import cut_info_bar
+from .numpy_files import read_npy, read_npz
 from .options import ReadOptions
 from .picture import Picture, picture_of
+from .pillow_images import read_by_pillow
+from .tiff import MAGIC, read_tiff
+from .volumes import read_mrc, read_nifti, read_nrrd
+from .zarr_images import is_zarr, read_zarr
 
-__all__ = ["Picture", "ReadOptions", "picture_of", "read_picture"]
-FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "DIB", "PPM", "GIF", "WEBP")
-KNOWN = "PNG, JPEG, TIFF, BMP, PPM/PGM/PBM, GIF, WebP or NPY"
+__all__ = ["FORMATS", "Format", "Picture", "ReadOptions", "format_of", "picture_of", "read_picture"]
+
+Reader = Callable[[Path, ReadOptions], Picture]
+
+
+class Format(NamedTuple):
+    """A format that is read."""
+
+    name: str
+    extensions: tuple[str, ...]
+    read: Reader
+    extra: str = ""  #: extra of this package that it needs; empty: none
+
+
+_RASTER = (".png", ".jpg", ".jpeg", ".bmp", ".dib", ".ppm", ".pgm", ".pbm", ".gif", ".webp")
+_TIFF = (".tif", ".tiff", ".btf", ".svs", ".ndpi", ".scn", ".lsm", ".stk")
+#: what is read by its extension; PNG, JPEG and TIFF by their content, whatever their names
+FORMATS = (
+    Format("PNG, JPEG, BMP, PPM, GIF, WebP", _RASTER, read_by_pillow),
+    Format("TIFF, OME-TIFF, GeoTIFF, SVS", _TIFF, read_tiff),
+    Format("NumPy", (".npy",), read_npy),
+    Format("NumPy, several arrays", (".npz",), read_npz),
+    Format("EDAX .ang", (".ang",), read_ang),
+    Format("Oxford .ctf", (".ctf",), read_ctf),
+    Format("HDF5: h5oina, DREAM.3D and others", (".h5oina", ".dream3d", ".h5", ".hdf5", ".h5ebsd"), read_hdf5, "hdf5"),
+    Format("OME-Zarr", (".zarr",), read_zarr, "zarr"),
+    Format("NRRD", (".nrrd", ".nhdr"), read_nrrd, "nrrd"),
+    Format("NIfTI", (".nii", ".nii.gz"), read_nifti, "nifti"),
+    Format("MRC", (".mrc", ".mrcs", ".map", ".rec", ".st"), read_mrc, "mrc"),
+)  # fmt: skip
+
+#: formats that VTK reads: `imgquad_mesh.read` and the command do
+OF_VTK = (".vti", ".vtk", ".vtkhdf", ".mha", ".mhd")
+
+#: formats that are not read, and the line that turns them into one that is
+CONVERTED_BY: Mapping[str, str] = {
+    ".cpr": "export the map as .ctf (Channel 5: Save as; AZtec: Export)",
+    ".crc": "export the map as .ctf (Channel 5: Save as; AZtec: Export)",
+    ".osc": "export the map as .ang from OIM Analysis (File, Export, Scan data)",
+    ".dcm": "pip install pydicom, then numpy.save('x.npy', pydicom.dcmread(FILE).pixel_array)",
+    ".czi": "pip install czifile, then tifffile.imwrite('x.tif', czifile.imread(FILE).squeeze())",
+    ".lif": "pip install liffile, then numpy.save('x.npy', liffile.LifFile(FILE).images[0].asarray())",
+    ".dm3": "pip install rosettasciio, then numpy.save('x.npy', rsciio.digitalmicrograph.file_reader(FILE)[0]['data'])",
+    ".dm4": "pip install rosettasciio, then numpy.save('x.npy', rsciio.digitalmicrograph.file_reader(FILE)[0]['data'])",
+    ".emd": "pip install rosettasciio, then numpy.save('x.npy', rsciio.emd.file_reader(FILE)[0]['data'])",
+    ".bcf": "pip install rosettasciio, then numpy.save('x.npy', rsciio.bruker.file_reader(FILE)[0]['data'])",
+    ".csv": "numpy.save('x.npy', numpy.loadtxt(FILE, delimiter=','))",
+    ".txt": "numpy.save('x.npy', numpy.loadtxt(FILE))",
+    ".asc": "numpy.save('x.npy', numpy.loadtxt(FILE, skiprows=6)), or gdal_translate FILE x.tif",
+    ".mat": "numpy.save('x.npy', scipy.io.loadmat(FILE)['NAME'])",
+    ".jp2": "gdal_translate FILE x.tif, or pip install imagecodecs, then numpy.save('x.npy', imagecodecs.imread(FILE))",
+    ".mrxs": "pip install openslide-python openslide-bin, then OpenSlide(FILE).read_region(...).save('x.png')",
+    ".pdf": "pdftoppm -r 300 -png FILE x",
+    ".svg": "inkscape FILE --export-type=png",
+    ".xyz": "gdal_translate FILE x.tif",
+    ".vrt": "gdal_translate FILE x.tif",
+    ".heic": "save it as PNG or TIFF",
+}
 
 
 def read_picture(path: str | Path, options: ReadOptions | None = None) -> Picture:
@@ -28,215 +85,91 @@ def read_picture(path: str | Path, options: ReadOptions | None = None) -> Pictur
     Parameters
     ----------
     path : str or Path
-        PNG, JPEG, TIFF, BMP, PPM/PGM/PBM, GIF, WebP by their content; NPY by its name. VTK files (.vti) are for
-        PyVista: ``pyvista.read(path).imgquad``.
+        A file of one of `FORMATS`. PNG, JPEG, TIFF, BMP, PPM, GIF and WebP are told by their content, all others by
+        their names. VTK's (.vti, .mha) are for `imgquad_mesh.read`.
     options : ReadOptions, optional
-        Pixel limit, and which frame of a stack.
+        Pixel limit; which frame, channel, level or array; what becomes of an info bar.
 
     Returns
     -------
     Picture
-        Grey values and labels as they are stored (8, 16, 32 bit or float; a small range that the format stretches is
-        put back: 2 and 4 bit PNG, PGM with a maximum other than 255), palette indices with their palette, or RGB.
-        CMYK, YCbCr and the like are turned into RGB. Alpha 0 becomes not opaque. 16 bit RGB is kept from TIFF; of a
-        PNG, Pillow gives the upper 8 bits.
+        Values as they are stored, row 0 on top: grey values and labels (8, 16, 32 bit or float; a small range that
+        the format stretches is put back: 2 and 4 bit PNG, PGM with a maximum other than 255; MinIsWhite is not
+        inverted), palette indices with their palette, or RGB. CMYK, YCbCr and the like are turned into RGB. Pixels
+        that the file says hold nothing (GDAL's no data, mask pages, points that were not indexed) are void.
 
     Raises
     ------
     InputError
-        If the file is missing, not a picture, cut off, too large, a stack, or holds no pixels or no finite numbers.
+        If the file is missing, no picture, cut off, too large, a stack of which none is chosen, or of a format whose
+        package is not installed.
 
     Notes
     -----
-    The orientation tag of a camera (EXIF, TIFF) is followed: the mesh lies as every viewer shows the picture.
+    The orientation tag of a camera (EXIF, TIFF) is followed: the mesh lies as every viewer shows the picture. Of
+    volumes and arrays the first stored row is on top, as NumPy prints them.
     """
     path, options = Path(path), options or ReadOptions()
-    if path.suffix.lower() in (".vti", ".vtk", ".vtkhdf"):
-        raise InputError(f"{path} is for VTK: read it by pyvista.read and mesh it by image.imgquad.mesh(...)")
+    found = format_of(path).read(path, options)
+    return cut_info_bar(found, options.info_bar)
+
+
+def format_of(path: Path) -> Format:
+    """Return how a file is read.
+
+    Raises
+    ------
+    InputError
+        It cannot be opened, is empty, or is of a format that is not read; the text says what turns it into one.
+    """
+    if is_zarr(path):
+        return _named(".zarr")
+    suffixes = [suffix.lower() for suffix in path.suffixes[-2:]]
+    if suffixes and suffixes[-1] in OF_VTK:
+        raise InputError(f"{path} is for VTK: mesh it by the command, or imgquad_mesh.read(path).imgquad.mesh(...)")
+    start = _first_bytes(path)
+    by_name = _by_name("".join(suffixes)) or (_by_name(suffixes[-1]) if suffixes else None)
+    if by_name is not None and by_name.read not in (read_by_pillow, read_tiff):
+        return by_name
+    if start.startswith(MAGIC):
+        return _named(".tif")
+    if start.startswith(b"\x89HDF\r\n\x1a\n"):
+        return _named(".h5")
+    if suffixes and suffixes[-1] in CONVERTED_BY and not start.startswith(_PICTURES):
+        raise InputError(f"{path} is not read directly: {CONVERTED_BY[suffixes[-1]].replace('FILE', repr(str(path)))}")
+    if not start.startswith(_PICTURES):
+        raise InputError(f"{path} is not a picture that can be read: give {_known()}")
+    return _named(".png")
+
+
+#: how files start that Pillow reads
+_PICTURES = (b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"RIFF", *(b"P%d" % k for k in range(1, 7)), b"Pf", b"PF")
+
+
+def _first_bytes(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            start = file.read(4)
+            start = file.read(16)
     except OSError as error:
         raise InputError(f"cannot open the picture {path} ({error.strerror}): give a file that can be read") from error
     if not start:
-        raise InputError(f"{path} is empty: give a picture ({KNOWN})")
-    if path.suffix.lower() == ".npy":
-        return _read_npy(path, options)
-    if start in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
-        return _read_tiff(path, options)
-    return _read_by_pillow(path, options)
+        raise InputError(f"{path} is empty: give a picture ({_known()})")
+    return start
 
 
-@contextmanager
-def _decoding(path: Path) -> Iterator[None]:
-    """Turn whatever a decoder raises on a broken file into one message."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        # decoders raise OSError, SyntaxError, ValueError, struct.error, zlib.error, IndexError ... on broken files
-        text = str(error).strip() or type(error).__name__
-        raise InputError(f"{path} cannot be decoded, it is cut off or damaged ({text}): save it anew") from error
+#: a few more, for messages
+_OTHERS = ("npy", "npz", "ang", "ctf", "h5oina", "dream3d", "zarr", "nrrd", "nii", "mrc", "vti", "mha")
 
 
-def _assert_pixels(path: Path, width: int, height: int, options: ReadOptions) -> None:
-    if width * height == 0:
-        raise InputError(f"{path} has {width} x {height} pixels: give at least one")
-    if width * height > options.max_pixels:
-        raise InputError(
-            f"{path} has {width} x {height} = {width * height} pixels, more than max_pixels = {options.max_pixels}:"
-            " crop or shrink it, or raise max_pixels"
-        )
+def _by_name(extension: str) -> Format | None:
+    return next((form for form in FORMATS if extension in form.extensions), None)
 
 
-def _chosen_frame(path: Path, n_frames: int, options: ReadOptions) -> int:
-    if options.frame is None and n_frames > 1:
-        raise InputError(
-            f"{path} holds {n_frames} pictures (a stack): choose one with frame = 0 to {n_frames - 1}"
-            f" (ReadOptions(frame={n_frames // 2})), or save one slice as a picture of its own"
-        )
-    frame = options.frame or 0
-    if frame >= n_frames:
-        raise InputError(f"frame is {frame}, but {path} holds {n_frames}: give 0 to {n_frames - 1}")
-    return frame
+def _named(extension: str) -> Format:
+    found = _by_name(extension)
+    assert found is not None
+    return found
 
 
-def _read_npy(path: Path, options: ReadOptions) -> Picture:
-    with _decoding(path):
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    stack = array.ndim == 4 or (array.ndim == 3 and array.shape[2] > 4)
-    if stack:
-        array = array[_chosen_frame(path, len(array), options)]
-    if array.ndim >= 2:
-        _assert_pixels(path, array.shape[1], array.shape[0], options)
-    return picture_of(np.array(array), str(path))
-
-
-def _read_tiff(path: Path, options: ReadOptions) -> Picture:
-    import tifffile
-
-    with _decoding(path), tifffile.TiffFile(path) as file:
-        every: list[Any] = list(file.pages)
-        pages = [page for page in every if not page.is_reduced] or every
-        page = pages[_chosen_frame(path, len(pages), options)].aspage()
-        _assert_pixels(path, page.imagewidth, page.imagelength, options)
-        if len(pages) == 1 and file.series and file.series[0].size > page.size:
-            raise InputError(f"{path} is a stack of the shape {file.series[0].shape}: save one slice as a picture")
-        try:
-            plain = page.photometric.name in ("MINISBLACK", "MINISWHITE", "RGB", "PALETTE")
-            values = page.asarray() if plain else None
-        except (ValueError, KeyError, ImportError):
-            values = None  # a codec that tifffile lacks; Pillow brings its own
-        if values is None:
-            return _read_by_pillow(path, options)
-        return _tiff_picture(page, values, str(path))
-
-
-def _tiff_picture(page: Any, values: NDArray[Any], name: str) -> Picture:
-    if page.axes.startswith("S"):
-        values = np.moveaxis(values, 0, -1)
-    if page.photometric.name == "MINISWHITE" and values.dtype.kind in "bu":
-        values = ~values
-    values = _upright(values, page.tags.valueof(274, default=1))
-    if page.photometric.name == "PALETTE" and values.ndim == 2:
-        return Picture(values, (page.colormap.T >> 8).astype(np.uint8), name=name)
-    extra = len(page.extrasamples or ())
-    samples = values.shape[2] if values.ndim == 3 else 1
-    if samples > 4 or (samples - extra, extra) not in ((1, 0), (1, 1), (3, 0), (3, 1)):
-        raise InputError(f"{name} has {samples} channels: give grey or RGB, with or without alpha")
-    return picture_of(values, name)
-
-
-def _upright(values: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Turn pixels as the orientation tag (TIFF 6.0, EXIF) says: where the stored rows and columns start."""
-    if orientation in (5, 6, 7, 8):
-        values = values.swapaxes(0, 1)
-    if orientation in (3, 4, 7, 8):
-        values = values[::-1]
-    if orientation in (2, 3, 6, 7):
-        values = values[:, ::-1]
-    return np.ascontiguousarray(values)
-
-
-@contextmanager
-def _own_pixel_limit() -> Iterator[None]:
-    """Leave the decision on large pictures to `max_pixels`; Pillow keeps a global limit of its own."""
-    from PIL import Image
-
-    limit = Image.MAX_IMAGE_PIXELS
-    Image.MAX_IMAGE_PIXELS = None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        Image.MAX_IMAGE_PIXELS = limit
-
-
-def _read_by_pillow(path: Path, options: ReadOptions) -> Picture:
-    from PIL import Image, UnidentifiedImageError
-
-    with _own_pixel_limit(), _decoding(path):
-        try:
-            image = Image.open(path, formats=FORMATS)
-        except UnidentifiedImageError as error:
-            raise InputError(f"{path} is not a picture that can be read: give {KNOWN}") from error
-        with image:
-            _assert_pixels(path, *image.size, options)
-            # a camera's MPO holds previews beside the picture
-            n_frames = 1 if image.format == "MPO" else getattr(image, "n_frames", 1)
-            image.seek(_chosen_frame(path, n_frames, options))
-            _assert_pixels(path, *image.size, options)
-            return _pillow_picture(image, str(path))
-
-
-def _pillow_picture(image: Any, name: str) -> Picture:
-    stretch = _stretch(image)
-    if image.mode not in ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "I", "F") and not image.mode.startswith("I;16"):
-        image = image.convert("RGBA" if image.mode in ("RGBa", "La") else "RGB")
-    values = np.asarray(image)
-    orientation = 1 if image.format == "TIFF" else image.getexif().get(274, 1)
-    values = _upright(values, orientation)
-    if image.mode == "I" and image.format in ("PNG", "PPM"):
-        values = values.astype(np.uint16)
-    if image.mode in ("P", "PA"):
-        return _palette_picture(image, values, name)
-    clear = image.info.get("transparency")
-    picture = picture_of(values, name)
-    if clear is not None and picture.opaque is None:
-        same = np.atleast_3d(values) == np.atleast_1d(clear)
-        picture = replace(picture, opaque=~same.all(axis=2))
-    if stretch != 1 and picture.is_grey:
-        unstretched = np.rint(picture.values * stretch).astype(picture.values.dtype)
-        picture = replace(picture, values=unstretched)
-    return picture
-
-
-def _stretch(image: Any) -> float:
-    """Return what undoes Pillow's stretching of a small range of grey values to 8 or 16 bits."""
-    if not image.tile:
-        return 1.0
-    args = image.tile[0][3]
-    mode = args if isinstance(args, str) else args[0]
-    if image.format == "PNG" and mode in ("L;2", "L;4"):
-        return 3 / 255 if mode == "L;2" else 15 / 255
-    if image.format == "PPM" and mode == "L" and isinstance(args, tuple) and isinstance(args[-1], int):
-        return args[-1] / (255 if image.mode == "L" else 65535)
-    return 1.0
-
-
-def _palette_picture(image: Any, values: NDArray[Any], name: str) -> Picture:
-    indices = values if values.ndim == 2 else values[..., 0]
-    palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
-    n_missing = int(indices.max()) + 1 - len(palette)
-    if n_missing > 0:
-        palette = np.concatenate([palette, np.zeros((n_missing, 3), np.uint8)])
-    opaque = np.ones(256, bool)
-    clear = image.info.get("transparency")
-    if isinstance(clear, bytes):
-        opaque[: len(clear)] = np.frombuffer(clear, np.uint8) > 0
-    elif clear is not None:
-        opaque[clear] = False
-    seen = opaque[indices] if values.ndim == 2 else values[..., 1] > 0
-    return Picture(indices, palette, None if seen.all() else seen, False, name)
+def _known() -> str:
+    return "PNG, JPEG, BMP, PPM/PGM/PBM, GIF, WebP, TIFF, " + ", ".join(f".{e}" for e in _OTHERS)

@@ -68,12 +68,26 @@ def _write_cohesive(pairs: Any) -> str:
     return pairs if isinstance(pairs, str) else _joined(f"{a}:{b}" for a, b in pairs or ())
 
 
-def _write_sides(size: float | tuple[float, float]) -> str:
-    return ",".join(repr(float(side)).removesuffix(".0") for side in (size if isinstance(size, tuple) else (size,)))
+def _write_numbers(value: str | float | tuple[float, float]) -> str:
+    if isinstance(value, str):
+        return value
+    return ",".join(repr(float(part)).removesuffix(".0") for part in (value if isinstance(value, tuple) else (value,)))
 
 
-def sides(text: str) -> float | tuple[float, float]:
+def point(text: str) -> str | tuple[float, float]:
+    """Return what --origin asks for."""
+    if text in ("auto", "file"):
+        return text
+    x, comma, y = text.partition(",")
+    if not comma:
+        raise argparse.ArgumentTypeError(f"'{text}' is neither X,Y nor auto nor file")
+    return number(x), number(y)
+
+
+def sides(text: str) -> str | float | tuple[float, float]:
     """Return what --pixel-size asks for."""
+    if text == "auto" or text.partition(":")[0] == "file":
+        return text
     width, comma, height = text.partition(",")
     return (number(width), number(height)) if comma else number(width)
 
@@ -168,7 +182,8 @@ TEXTS: Mapping[str, Text] = {
         size_of,
         dict,
     ),
-    "pixel_size": Text(sides, _write_sides, "LENGTH|WIDTH,HEIGHT", "Written 0.5, or 0.5,0.7."),
+    "pixel_size": Text(sides, _write_numbers, "LENGTH|WIDTH,HEIGHT|file[:UNIT]", "Written 0.5, or 0.5,0.7."),
+    "origin": Text(point, _write_numbers, "X,Y|file", "Written 500000,4600000."),
     "drop": Text(
         lambda text: tuple(_items(text)),
         lambda names: _joined(map(str, names)),
@@ -178,6 +193,8 @@ TEXTS: Mapping[str, Text] = {
         str,
     ),
     "frame": Text(_none_or(whole, ""), _write_or(str, ""), "N", "Empty: there is one only."),
+    "channel": Text(_none_or(whole, ""), _write_or(str, ""), "N", "Empty: there is one only."),
+    "scalars": Text(_none_or(str, ""), _write_or(str, ""), "NAME", "Empty: the one that is most likely meant."),
     "cohesive": Text(
         _cohesive,
         _write_cohesive,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def add_parser(subparsers: Any) -> None:
     """Add the subcommand."""
     parser = subparsers.add_parser("run", help="mesh a picture", description="Mesh a picture.")
-    parser.add_argument("image", type=Path, metavar="IMAGE", help="PNG, JPEG, TIFF, BMP, PPM, PGM, NPY or VTI")
+    parser.add_argument("image", type=Path, metavar="IMAGE", help="PNG, JPEG, TIFF and many more: docs, Pictures")
     parser.add_argument("output", type=Path, metavar="OUTPUT", help="file of the mesh; its extension tells the format")
     add_mesh_options(parser)
     add_element_options(parser)
@@ -149,12 +149,10 @@ def mesh_to_files(
 
 def _run(image: Path, options: MeshOptions, progress: Callable[[str, int, int], None]) -> Run:
     from imgquad_core.pipeline import run
+    from imgquad_mesh.datasets.vtk_files import EXTENSIONS, read_vtk
 
-    if image.suffix.lower() != ".vti":
-        return run(image, options, progress)
-    from imgquad_mesh.outputs.files import read_vti
-
-    return run(read_vti(image, options.max_pixels), options, progress)
+    source = read_vtk(image, options.reading()) if image.suffix.lower() in EXTENSIONS else image
+    return run(source, options, progress)
 
 
 def _write(run: Run, outputs: Outputs, writing: Writing) -> None:
@@ -168,7 +166,7 @@ def _write(run: Run, outputs: Outputs, writing: Writing) -> None:
         files.write_picture(run.mesh, outputs.picture)
     if outputs.script:
         _write_script(run.options, outputs.script)
-    files.write_mesh_file(run.mesh, outputs.mesh, writing.elements, **writing.options)
+    files.write_run(run, outputs.mesh, writing.elements, **writing.options)
 
 
 def _write_script(options: MeshOptions, path: Path) -> None:

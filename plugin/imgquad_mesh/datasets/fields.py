@@ -9,8 +9,11 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from imgquad_core.model import Materials
+from imgquad_core.picture import Calibration
 
 NUMBERS, NAMES, COLORS = MATERIAL_FIELDS = ("material_numbers", "material_names", "material_colors")
+#: of grains: phase and Bunge's Euler angles (degrees, NaN where unknown) of each
+PHASES, ORIENTATIONS = CRYSTAL_FIELDS = ("material_phases", "material_orientations")
 
 
 def put_materials(dataset: pv.DataSet, materials: Materials) -> None:
@@ -18,6 +21,10 @@ def put_materials(dataset: pv.DataSet, materials: Materials) -> None:
     dataset.field_data[NUMBERS] = materials.labels
     dataset.field_data[NAMES] = list(materials.names)
     dataset.field_data[COLORS] = materials.colors
+    if materials.phases is not None:
+        dataset.field_data[PHASES] = list(materials.phases)
+    if materials.orientations is not None:
+        dataset.field_data[ORIENTATIONS] = materials.orientations
 
 
 def materials_of(dataset: pv.DataSet, present: NDArray[Any] | None = None) -> Materials:
@@ -25,10 +32,46 @@ def materials_of(dataset: pv.DataSet, present: NDArray[Any] | None = None) -> Ma
     fields = dataset.field_data
     if present is None or (NUMBERS in fields and NAMES in fields):
         names = tuple(map(str, fields[NAMES]))
-        return Materials(fields[NUMBERS], names, fields[COLORS] if COLORS in fields else _grey(len(names)))
+        colors = fields[COLORS] if COLORS in fields else _grey(len(names))
+        return Materials(fields[NUMBERS], names, colors, *_crystals(fields))
     numbers = np.unique(present)
     return Materials(numbers, tuple(f"material {number}" for number in numbers), _grey(len(numbers)))
 
 
 def _grey(n: int) -> NDArray[np.uint8]:
     return np.full((n, 3), 128, np.uint8)
+
+
+def _crystals(fields: Any) -> tuple[tuple[str, ...] | None, NDArray[Any] | None]:
+    phases = tuple(map(str, fields[PHASES])) if PHASES in fields else None
+    return phases, fields.get(ORIENTATIONS, None)
+
+
+def put_calibration(
+    dataset: pv.DataSet,
+    found: Calibration,
+    placement: tuple[tuple[float, float], tuple[float, float]] | None = None,
+) -> None:
+    """Store pixel size and place in the field arrays of a dataset, in place; an image gets spacing and origin.
+
+    Parameters
+    ----------
+    dataset : pyvista.DataSet
+        An image or a mesh.
+    found : Calibration
+        What the file says.
+    placement : tuple, optional
+        Pixel size and origin of a mesh, as it was made.
+    """
+    size = found.size
+    if placement is not None:
+        dataset.field_data["pixel_size"], dataset.field_data["origin"] = map(list, placement)
+    elif size is not None and (not size.doubt or found.crs):
+        dataset.spacing = (size.x, size.y, 1.0)
+        dataset.origin = (*(found.origin or (0.0, 0.0)), 0.0)
+    if size is not None:
+        dataset.field_data["file_pixel_size"] = [size.x, size.y]
+        for name, text in (("unit", size.unit), ("source", size.source), ("doubt", size.doubt)):
+            dataset.field_data[f"file_pixel_size_{name}"] = [text]
+    if found.crs:
+        dataset.field_data["crs"] = [found.crs]

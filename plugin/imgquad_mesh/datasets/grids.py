@@ -32,13 +32,18 @@ def to_grid(mesh: QuadMesh, placement: Placement = PLAIN) -> pv.UnstructuredGrid
     """Return a grid of counter-clockwise VTK_QUAD cells.
 
     Cell arrays `material` (int32, active) and `region` (int32); field arrays `material_numbers` (int32),
-    `material_names` and `material_colors` (uint8 RGB), one entry a material.
+    `material_names` and `material_colors` (uint8 RGB), one entry a material. Of grains also the cell array
+    `orientation` (Bunge's Euler angles, degrees, shape (n, 3)) and the field arrays `material_phases` and
+    `material_orientations`.
     """
     quads = mesh.quads[:, ::-1] if placement.mirrored else mesh.quads
     grid = pv.UnstructuredGrid({pv.CellType.QUAD: quads}, placement.place(mesh.points))
     grid.cell_data["region"] = mesh.quad_region.astype(np.int32)
     grid.cell_data["material"] = mesh.quad_material
     put_materials(grid, mesh.materials)
+    if mesh.materials.orientations is not None:
+        rows = np.searchsorted(mesh.materials.labels, mesh.quad_material)
+        grid.cell_data["orientation"] = mesh.materials.orientations[rows]
     grid.set_active_scalars("material", preference="cell")
     return grid
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from imgquad_core.model import LabelImage
 from .fields import NUMBERS, materials_of, put_materials
 from .placement import Placement
 
+#: cell array of the values as `imgquad_mesh.read` gives them, and what it stores beside them
+PICTURE, VOID_PIXELS, OPAQUE, PALETTE = "picture", "void", "opaque", "palette"
 MATERIAL = "material"  #: array that a segmented image has
 QUANTISED = "material_quantised"  #: field array: 1 where colours were quantised and noise is not removed yet
 
@@ -42,7 +45,7 @@ def image_array(image: pv.ImageData, scalars: str | None = None) -> NDArray[Any]
     name, association = scalars_of(image, scalars)
     u, v = flat_axes(image, name, association)
     values = np.asarray(image.point_data[name] if association == "point" else image.cell_data[name])
-    counts = _pixel_counts(image, association)
+    counts = pixel_counts(image, association)
     return np.ascontiguousarray(values.reshape(counts[v], counts[u], *values.shape[1:])[::-1])
 
 
@@ -59,7 +62,7 @@ def image_placement(image: pv.ImageData, scalars: str | None = None) -> Placemen
 
 def flat_axes(image: pv.ImageData, name: str, association: str) -> tuple[int, int]:
     """Return the axes that a flat image runs along: of the columns and of the rows."""
-    counts = _pixel_counts(image, association)
+    counts = pixel_counts(image, association)
     if min(counts) < 1:
         raise InputError(f"image '{name}' has {' x '.join(map(str, counts))} pixels: there is nothing to mesh")
     thin = [axis for axis in (2, 1, 0) if counts[axis] == 1]
@@ -87,7 +90,8 @@ def scalars_of(image: pv.ImageData, scalars: str | None = None) -> tuple[str, st
     return scalars, association.lower()
 
 
-def _pixel_counts(image: pv.ImageData, association: str) -> tuple[int, int, int]:
+def pixel_counts(image: pv.ImageData, association: str) -> tuple[int, int, int]:
+    """Return the number of pixels along each axis."""
     nx, ny, nz = image.dimensions
     return (nx, ny, nz) if association == "point" else (max(nx - 1, 1), max(ny - 1, 1), max(nz - 1, 1))
 
@@ -99,13 +103,23 @@ def segmented(
     name, _ = scalars_of(image, scalars)
     values, options = image_array(image, name), options or core.picture.SegmentationOptions()
     if name != MATERIAL or NUMBERS not in image.field_data or options.colors not in ("auto", "exact"):
-        return core.picture.segment_picture(values, options)
+        return core.picture.segment_picture(_picture(image, name, values), options)
     materials = materials_of(image)
     unknown = np.setdiff1d(values, [-1, *materials.labels])
     if len(unknown):
         raise InputError(f"array 'material' holds {unknown[0]}, 'material_numbers' does not: segment the image anew")
     quantised = QUANTISED in image.field_data and bool(image.field_data[QUANTISED].any())
     return core.picture.Segmentation(LabelImage(values, materials), quantised)
+
+
+def _picture(image: pv.ImageData, name: str, values: NDArray[Any]) -> core.picture.Picture:
+    """Return the picture in an image, with what `imgquad_mesh.read` has stored beside its values."""
+    if name != PICTURE or PICTURE not in image.cell_data:
+        return core.picture.picture_of(values)
+    masks = {key: image_array(image, key) > 0 for key in (VOID_PIXELS, OPAQUE) if key in image.cell_data}
+    palette = np.asarray(image.field_data[PALETTE], np.uint8) if PALETTE in image.field_data else None
+    found = core.picture.Picture(values, palette) if palette is not None else core.picture.picture_of(values)
+    return replace(found, void=masks.get(VOID_PIXELS), opaque=masks.get(OPAQUE))
 
 
 def with_materials(image: pv.ImageData, found: core.picture.Segmentation, scalars: str | None = None) -> pv.ImageData:

@@ -13,7 +13,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.measures.quality import quad_areas
 from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
 from imgquad_core.picture.reading import ReadOptions
-from imgquad_mesh.outputs.files import read_vti
+from imgquad_mesh.datasets.pictures import read_any
 
 from .layer import Layer
 from .meshsets import quad_layer, quad_mesh
@@ -102,13 +102,11 @@ class State:
     boundary: BoundaryGraph | None = None
     made: dict[int, QuadMesh] = field(default_factory=dict)  # meshes of ours by the id of their layer
 
-    def need_image(self) -> Any:
-        """Return the picture: its path, or what it was read to."""
+    def need_image(self, options: ReadOptions | None = None) -> Any:
+        """Return the picture: what its file holds, or what was given."""
         if self.image is None:
             raise InputError("there is no picture; give one as input")
-        if isinstance(self.image, (str, Path)) and Path(self.image).suffix.lower() == ".vti":
-            self.image = read_vti(Path(self.image), ReadOptions.max_pixels)
-        return self.image
+        return read_any(self.image, options) if isinstance(self.image, (str, Path)) else self.image
 
     def put_labels(self, labels: LabelImage) -> None:
         """Make another labelled picture the current one; boundaries of the former are dropped."""

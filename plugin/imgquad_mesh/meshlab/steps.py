@@ -34,7 +34,6 @@ from imgquad_core.picture import (
     drop_materials,
     list_removed,
     remove_noise,
-    segment_picture,
     sizes_by_number,
 )
 from imgquad_mesh.outputs.files import check_target, mesh_extensions, write_labels, write_mesh_file
@@ -111,8 +110,7 @@ class LabelFileOptions:
 
 
 def _segment(state: State, options: SegmentationOptions) -> dict[str, Any]:
-    image = state.need_image()
-    found = segment_picture(pipeline.read_source(image), options)
+    found = pipeline.segment_source(pipeline.read_source(state.need_image()), options)
     state.put_labels(found.image)
     return {"note": found.note, **_label_counts(found.image)}
 
@@ -197,7 +195,7 @@ def _mesh_boundary(state: State, options: MeshingOptions) -> dict[str, Any]:
 
 
 def _mesh_image(state: State, options: MeshOptions) -> dict[str, Any]:
-    done = pipeline.run(state.labels if state.labels is not None else state.need_image(), options)
+    done = pipeline.run(state.labels if state.labels is not None else state.need_image(options.reading()), options)
     state.labels, state.pixel_boundary, state.boundary = done.labels, done.pixel_boundary, done.boundary
     state.put_mesh(done.mesh)
     return _size_of(done.mesh) | {"triangulator": triangulator_used(options.triangulator)}

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-import logging
 import os
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
 
@@ -52,8 +49,28 @@ def mesh_extensions() -> tuple[str, ...]:
     return (*GRID_EXTENSIONS, *sorted(WRITERS))
 
 
-def write_mesh_file(mesh: QuadMesh, path: Path, elements: ElementOptions | None = None, **options: Any) -> None:
-    """Write `mesh`, as the `elements` asked for, in the format that the extension of `path` names."""
+def write_run(run: Run, path: Path, elements: ElementOptions | None = None, **options: Any) -> None:
+    """Write the mesh of a run as `write_mesh_file` does; VTK's formats also hold pixel size, place and CRS."""
+
+    def add_place(grid: Any) -> None:
+        from imgquad_mesh.datasets.fields import put_calibration
+
+        put_calibration(grid, run.calibration, (run.options.pixel_sides, run.options.corner))
+
+    write_mesh_file(run.mesh, path, elements, add_place, **options)
+
+
+def write_mesh_file(
+    mesh: QuadMesh,
+    path: Path,
+    elements: ElementOptions | None = None,
+    complete: Callable[[Any], None] | None = None,
+    **options: Any,
+) -> None:
+    """Write `mesh`, as the `elements` asked for, in the format that the extension of `path` names.
+
+    `complete` adds to the grid that VTK writes.
+    """
     from imgquad_core.fe import fe_mesh, make_elements
 
     made = make_elements(mesh, elements) if elements and not elements.plain else None
@@ -63,6 +80,8 @@ def write_mesh_file(mesh: QuadMesh, path: Path, elements: ElementOptions | None 
         from imgquad_mesh.datasets.grids import to_fe_grid, to_grid
 
         grid = to_fe_grid(made) if made else to_grid(mesh)
+        if complete:
+            complete(grid)
         replace_file(path, lambda temporary: save_dataset(grid, temporary))
     else:
         from imgquad_core.writers import write_mesh
@@ -112,7 +131,7 @@ def write_boundaries(run: Run, path: Path) -> None:
 
     graph = run.boundary
     materials = np.append(graph.region_label, np.int32(-1))[graph.chain_regions]  # region -1 takes the last one
-    points = graph.points * run.square
+    points = graph.points * run.square + run.options.corner
     lines = chain_lines(points, graph.chain_offsets, graph.chain_points, materials, graph.point_kind)
     replace_file(path, lambda temporary: save_dataset(lines, temporary))
 
@@ -162,6 +181,8 @@ def save_dataset(dataset: Any, path: Path) -> None:
         arrays = len(dataset.array_names) + 6  # with points, cells
         take_room(path.parent, 1024 * dataset.GetActualMemorySize() + 8 * HDF_CHUNK * arrays)
     if path.suffix.lower() not in writers:
+        from imgquad_mesh.datasets.vtk_files import silent_vtk
+
         with silent_vtk():
             dataset.save(path)
         return
@@ -171,44 +192,6 @@ def save_dataset(dataset: Any, path: Path) -> None:
     if not writer.Write():
         raise OSError(f"VTK cannot format {path.suffix}")
     path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
-
-
-def read_vti(path: Path, max_pixels: int) -> NDArray[Any]:
-    """Return the picture in a file of VTK's image data, the top row first."""
-    import pyvista as pv
-    from pyvista.core.errors import MissingDataError
-
-    from imgquad_mesh.datasets.images import image_array
-
-    if not path.is_file():
-        raise InputError(f"cannot open the picture {path}: there is no such file")
-    try:
-        with silent_vtk():
-            image = pv.XMLImageDataReader(str(path)).read()
-            damaged = image.n_points == 0
-    except Exception as error:  # VTK's own texts are many lines long
-        raise InputError(f"{path} cannot be read as VTK image data: save it anew") from error
-    if damaged:
-        raise InputError(f"{path} has no pixels, or is damaged: save it anew")
-    if image.n_points > max_pixels:
-        raise InputError(f"{path} has {image.n_points} pixels, more than max_pixels = {max_pixels}: raise max_pixels")
-    try:
-        return image_array(image)
-    except (KeyError, MissingDataError) as error:
-        raise InputError(f"{path}: {error}; save it with an array of labels, greys or colours") from error
-
-
-@contextmanager
-def silent_vtk() -> Iterator[None]:
-    """Keep VTK and PyVista from printing what the errors raised here say in one line."""
-    import pyvista as pv
-
-    logging.disable(logging.CRITICAL)
-    try:
-        with pv.vtk_verbosity("off"):
-            yield
-    finally:
-        logging.disable(logging.NOTSET)
 
 
 def _save_labels(image: LabelImage, path: Path) -> None:

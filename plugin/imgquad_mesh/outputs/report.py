@@ -38,6 +38,7 @@ def build_report(
         "columns": cols,
         "rows": rows,
         "options": _options(run),
+        "picture": _calibration(run),
         "notes": list(notes(run)),
         "warnings": list(run.segmentation.warnings),
         "materials": [asdict(row) for row in ledger],
@@ -54,6 +55,7 @@ def build_report(
 def notes(run: Run) -> Iterator[str]:
     """Say in words what was decided by itself, what was removed, and what the user may want to change."""
     yield run.segmentation.note
+    yield from run.notes
     if run.noise.removes:
         limits = f"clusters below {run.noise.min_pixels} pixels and shorter than {run.noise.min_length:g} px"
         removed = sum(removal.clusters for removal in run.removed)
@@ -78,6 +80,17 @@ def peak_memory_mb() -> float | None:
         return None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return round(peak / (1e6 if sys.platform == "darwin" else 1e3), 1)
+
+
+def _calibration(run: Run) -> dict[str, Any]:
+    """Return what the file says of pixel size and place, and what the mesh has."""
+    found, options = run.calibration, run.options
+    file = {
+        "pixel_size": asdict(found.size) if found.size else None,
+        "origin": list(found.origin) if found.origin else None,
+        "crs": found.crs,
+    }
+    return {"file": file, "mesh": {"pixel_size": list(options.pixel_sides), "origin": list(options.corner)}}
 
 
 def _options(run: Run) -> dict[str, Any]:

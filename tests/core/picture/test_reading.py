@@ -40,7 +40,7 @@ def test_grey_values_and_labels_come_as_they_are_stored(tmp_path: Path, name: st
     else:
         values = picture.values if picture.palette is None else picture.palette[picture.values][..., 0]
         assert (values == GREY).all()
-    assert picture.labels == (name == "a.npy")
+    assert not picture.labels  # what a format does not say is judged by the pixels
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.bmp", "a.tif", "a.ppm"])
@@ -84,7 +84,7 @@ def test_tiff_keeps_the_values_of_every_type(tmp_path: Path, dtype: type, order:
     picture = read_picture(tmp_path / "a.tif")
     assert picture.values.dtype == dtype
     assert (picture.values == values).all()
-    assert picture.labels == (dtype in (np.int16, np.int32, np.uint32))
+    assert not picture.labels
 
 
 def test_tiff_of_16_bit_colours_planes_and_inverted_grey(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_tiff_of_16_bit_colours_planes_and_inverted_grey(tmp_path: Path) -> None
     tifffile.imwrite(tmp_path / "b.tif", np.moveaxis(RGB, -1, 0), photometric="rgb", planarconfig="separate")
     assert (read_picture(tmp_path / "b.tif").values == RGB).all()
     tifffile.imwrite(tmp_path / "c.tif", GREY, photometric="miniswhite")
-    assert (read_picture(tmp_path / "c.tif").values == 255 - GREY).all()
+    assert (read_picture(tmp_path / "c.tif").values == GREY).all()  # the numbers that were stored
     Image.fromarray(RGB).save(tmp_path / "d.tif", compression="tiff_lzw")  # tifffile alone has no LZW
     assert (read_picture(tmp_path / "d.tif").values == RGB).all()
 
@@ -129,11 +129,11 @@ def _png_of_4_bit_grey(values: NDArray[np.uint8]) -> bytes:
 
 def test_transparent_pixels_are_not_opaque(tmp_path: Path) -> None:
     alpha = np.where(GREY > 100, 255, 0).astype(np.uint8)
-    alpha[0, 1] = 1
+    alpha[0, 1], alpha[2, 1] = 127, 128  # a soft edge ends in its middle
     for array in (np.dstack([RGB, alpha]), np.dstack([GREY, alpha])):
         picture = read_picture(saved(tmp_path / "a.png", array))
         assert picture.opaque is not None
-        assert (picture.opaque == (alpha > 0)).all()
+        assert (picture.opaque == (alpha > 127)).all()
     saved(tmp_path / "rgb.png", RGB, transparency=tuple(int(v) for v in RGB[1, 2]))
     picture = read_picture(tmp_path / "rgb.png")
     assert picture.opaque is not None
@@ -144,7 +144,7 @@ def test_transparent_pixels_are_not_opaque(tmp_path: Path) -> None:
     picture = read_picture(tmp_path / "p.png")
     assert picture.opaque is not None
     assert np.argwhere(~picture.opaque).tolist() == [[1, 1]]
-    assert read_picture(saved(tmp_path / "full.png", np.dstack([RGB, GREY | 1]))).opaque is None
+    assert read_picture(saved(tmp_path / "full.png", np.dstack([RGB, GREY | 128]))).opaque is None
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
@@ -170,10 +170,10 @@ def test_a_stack_names_its_remedy_and_the_remedy_works(tmp_path: Path) -> None:
     )
     np.save(tmp_path / "s.npy", stack)
     for name in ("s.tif", "i.tif", "s.gif", "s.npy"):
-        with pytest.raises(InputError, match=r"holds \d pictures .*frame"):
+        with pytest.raises(InputError, match=r"holds \d pictures .*(frame|channel) = 0 to 2"):
             read_picture(tmp_path / name)
         assert read_picture(tmp_path / name, ReadOptions(frame=0)).shape[0] == 3
-        with pytest.raises(InputError, match="frame is 9"):
+        with pytest.raises(InputError, match=r"(frame|channel) is 9"):
             read_picture(tmp_path / name, ReadOptions(frame=9))
     assert (read_picture(tmp_path / "s.tif", ReadOptions(frame=1)).values == stack[1]).all()
 
@@ -208,7 +208,7 @@ def test_missing_files_folders_and_vtk_files_say_what_to_do(tmp_path: Path) -> N
         read_picture(tmp_path / "missing.png")
     with pytest.raises(InputError, match="directory"):
         read_picture(tmp_path)
-    with pytest.raises(InputError, match=r"pyvista\.read"):
+    with pytest.raises(InputError, match=r"imgquad_mesh\.read"):
         read_picture(tmp_path / "a.vti")
     if os.geteuid() != 0:
         saved(tmp_path / "a.png", GREY).chmod(0)
@@ -246,8 +246,7 @@ def test_arrays_that_are_no_pictures_are_refused() -> None:
         (np.zeros(5), "one plane"),
         (np.zeros((3, 4, 5)), "one slice"),
         (np.zeros((2, 3, 4, 5)), "one slice"),
-        (np.array([[1.0, np.nan]]), "nan at row 0, column 1"),
-        (np.array([[1.0], [np.inf]]), "inf at row 1"),
+        (np.array([[np.inf, np.nan]]), "no finite number"),
         (np.array([["a"]]), "type"),
         (np.array([[1j]]), "complex"),
         (np.full((2, 2, 3), -1), "from -1"),
@@ -258,15 +257,16 @@ def test_arrays_that_are_no_pictures_are_refused() -> None:
             picture_of(bad)
 
 
-def test_nan_and_empty_in_a_file_are_refused(tmp_path: Path) -> None:
+def test_nan_is_void_and_empty_files_are_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "nan.npy", np.array([[0.0, np.nan]]))
-    with pytest.raises(InputError, match=r"nan\.npy.*nan at row 0"):
-        read_picture(tmp_path / "nan.npy")
+    picture = read_picture(tmp_path / "nan.npy")
+    assert picture.void is not None
+    assert picture.void.tolist() == [[False, True]]
     np.save(tmp_path / "zero.npy", np.zeros((0, 3), int))
     with pytest.raises(InputError, match="pixels: give at least one"):
         read_picture(tmp_path / "zero.npy")
     np.save(tmp_path / "objects.npy", np.array([[None]]), allow_pickle=True)
-    with pytest.raises(InputError, match="objects"):
+    with pytest.raises(InputError, match=r"Python objects: .*numpy\.save"):
         read_picture(tmp_path / "objects.npy")
 
 
@@ -274,15 +274,14 @@ def test_arrays_in_memory_mean_what_files_mean() -> None:
     assert picture_of(GREY).is_grey
     assert picture_of(GREY[..., None]).values.shape == (3, 4)
     assert picture_of(GREY > 50).values.max() == 1
-    assert picture_of(GREY.astype(int)).labels
-    assert not picture_of(GREY).labels
+    assert not picture_of(GREY.astype(int)).labels
     assert (picture_of(RGB / 255).values == RGB).all()
     assert (picture_of(RGB.astype(float)).values == RGB).all()
     assert (picture_of(RGB.astype(int)).values == RGB).all()
     assert (picture_of(RGB.astype(">u2") * 256).values == RGB.astype(int) * 256).all()
     picture = picture_of(np.dstack([RGB, GREY]))
     assert picture.opaque is not None
-    assert np.argwhere(~picture.opaque).tolist() == [[0, 0]]
+    assert (picture.opaque == (GREY > 127)).all()
 
 
 def test_all_real_pictures_are_read(images: Path) -> None:

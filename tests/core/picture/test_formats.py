@@ -1,0 +1,436 @@
+"""Volumes, OME-Zarr, HDF5 and NumPy's archives: slices, channels, levels, names, sizes, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tifffile
+from numpy.typing import NDArray
+from PIL import Image
+
+from imgquad_core.errors import InputError
+from imgquad_core.picture.reading import CONVERTED_BY, ReadOptions, read_picture
+
+VOLUME = (np.arange(3 * 20 * 30).reshape(3, 20, 30) // 7 % 200).astype(np.uint8)
+PLANE = VOLUME[1]
+
+
+def size_text(path: Path, **options: Any) -> str | None:
+    found = read_picture(path, ReadOptions(**options)).calibration.size
+    return found.text if found else None
+
+
+# ------------------------------------------------------------------------------------------------- volumes
+
+
+def write_nrrd(path: Path, volume: NDArray[Any], **header: Any) -> Path:
+    nrrd = pytest.importorskip("nrrd")
+    nrrd.write(str(path), volume, header, index_order="C")
+    return path
+
+
+@pytest.mark.parametrize("encoding", ["raw", "gzip", "bzip2"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32, ">u2"])
+def test_a_slice_of_an_nrrd_volume(tmp_path: Path, encoding: str, dtype: Any) -> None:
+    path = write_nrrd(tmp_path / "a.nrrd", VOLUME.astype(dtype), encoding=encoding, spacings=[0.5, 0.5, 2.0])
+    with pytest.raises(InputError, match=r"3 pictures.*frame = 0 to 2"):
+        read_picture(path)
+    found = read_picture(path, ReadOptions(frame=1))
+    assert (found.values == PLANE).all()
+    assert found.notes == ("slice 1 of 3, counted from 0",)
+    assert size_text(path, frame=1) == "0.5"
+
+
+def test_an_nrrd_plane_its_directions_and_colours(tmp_path: Path) -> None:
+    space = {"space": "left-posterior-superior", "space directions": [[0.0, 0.25], [0.25, 0.0]], "space dimension": 2}
+    space.pop("space")
+    path = write_nrrd(tmp_path / "a.nrrd", PLANE, **space)
+    assert (read_picture(path).values == PLANE).all()
+    assert size_text(path) == "0.25"
+    colours = np.stack([PLANE, 255 - PLANE, PLANE // 2], axis=-1)
+    path = write_nrrd(tmp_path / "b.nrrd", colours, kinds=["RGB-color", "domain", "domain"])
+    assert (read_picture(path).values == colours).all()
+    assert (read_picture(path, ReadOptions(channel=2)).values == PLANE // 2).all()
+
+
+def test_a_slice_of_a_nifti_file_with_its_zooms(tmp_path: Path) -> None:
+    nibabel = pytest.importorskip("nibabel")
+    for name in ("a.nii", "a.nii.gz"):
+        image = nibabel.Nifti1Image(VOLUME.T.astype(np.int16), np.diag([0.3, 0.3, 5.0, 1.0]))
+        image.header.set_xyzt_units("mm")
+        nibabel.save(image, tmp_path / name)
+        found = read_picture(tmp_path / name, ReadOptions(frame=1))
+        assert (found.values == PLANE).all()
+        assert size_text(tmp_path / name, frame=1) == "0.3 mm"
+    plain = nibabel.Nifti1Image(PLANE.T.copy(), np.eye(4))
+    nibabel.save(plain, tmp_path / "b.nii")
+    assert (read_picture(tmp_path / "b.nii").values == PLANE).all()
+    assert read_picture(tmp_path / "b.nii").calibration.size is None  # without a unit, zooms are placeholders
+
+
+def test_a_section_of_an_mrc_file_with_its_voxels(tmp_path: Path) -> None:
+    mrcfile = pytest.importorskip("mrcfile")
+    with mrcfile.new(tmp_path / "a.mrc") as file:
+        file.set_data(VOLUME.astype(np.float32))
+        file.voxel_size = 1.7
+    assert (read_picture(tmp_path / "a.mrc", ReadOptions(frame=1)).values == PLANE).all()
+    assert size_text(tmp_path / "a.mrc", frame=1) == "1.7 angstrom"
+
+
+# ---------------------------------------------------------------------------------------------------- Zarr
+
+
+def write_ome(path: Path, version: str, planes: NDArray[Any], axes: str, scale: float = 0.65, **more: Any) -> Path:
+    """Write a multiscale picture of two levels as OME-Zarr 0.4 or 0.5, by zarr alone."""
+    zarr = pytest.importorskip("zarr")
+    group = zarr.open_group(path, mode="w", zarr_format=2 if version == "0.4" else 3)
+    kinds = {"c": "channel", "t": "time"}
+    units = {"x": "micrometer", "y": "micrometer"}
+    named = [{"name": a, "type": kinds.get(a, "space"), **({"unit": units[a]} if a in units else {})} for a in axes]
+    levels = [planes, planes[..., ::2, ::2]]
+    datasets = []
+    for k, level in enumerate(levels):
+        chunks = (1,) * (level.ndim - 2) + (8, 16)
+        array = group.create_array(f"s{k}", shape=level.shape, dtype=level.dtype, chunks=chunks)
+        array[...] = level
+        steps = [scale * 2**k if a in "yx" else 1.0 for a in axes]
+        datasets.append({"path": f"s{k}", "coordinateTransformations": [{"type": "scale", "scale": steps}]})
+    meta = {"multiscales": [{"version": version, "axes": named, "datasets": datasets, "name": "x"}], **more}
+    group.attrs.update(meta if version == "0.4" else {"ome": {"version": version, **meta}})
+    return path
+
+
+def add_labels(path: Path, version: str, names: list[str]) -> None:
+    zarr = pytest.importorskip("zarr")
+    for name in names:
+        write_ome(path / "labels" / name, version, PLANE.astype(np.uint32) + len(name), "yx", **{"image-label": {}})
+    if version == "0.4":
+        (path / "labels" / ".zgroup").write_text('{"zarr_format": 2}')
+        (path / "labels" / ".zattrs").write_text(json.dumps({"labels": names}))
+    else:
+        meta = {"zarr_format": 3, "node_type": "group", "attributes": {"ome": {"version": "0.5", "labels": names}}}
+        (path / "labels" / "zarr.json").write_text(json.dumps(meta))
+    assert "labels" in zarr.open_group(path, mode="r")
+
+
+@pytest.mark.parametrize("version", ["0.4", "0.5"])
+def test_ome_zarr_pictures_channels_and_levels(tmp_path: Path, version: str) -> None:
+    path = write_ome(tmp_path / "a.zarr", version, np.stack([VOLUME, 199 - VOLUME])[:, None], "ctzyx"[:5])
+    options = ReadOptions(channel=1, frame=1)
+    assert (read_picture(path, options).values == 199 - PLANE).all()
+    assert size_text(path, channel=1, frame=1) == "0.65 um"
+    with pytest.raises(InputError, match=r"channel = 0 to 1"):
+        read_picture(path, ReadOptions(frame=1))
+    coarse = read_picture(path, ReadOptions(channel=0, frame=1, level=1))
+    assert (coarse.values == PLANE[::2, ::2]).all()
+    assert size_text(path, channel=0, frame=1, level=1) == "1.3 um"
+    with pytest.raises(InputError, match="level is 2"):
+        read_picture(path, ReadOptions(level=2))
+
+
+@pytest.mark.parametrize("version", ["0.4", "0.5"])
+def test_the_label_image_of_an_ome_zarr_picture(tmp_path: Path, version: str) -> None:
+    path = write_ome(tmp_path / "a.zarr", version, PLANE, "yx")
+    assert not read_picture(path).labels
+    add_labels(path, version, ["cells"])
+    found = read_picture(path)
+    assert found.labels
+    assert (found.values == PLANE.astype(int) + 5).all()
+    assert "label image cells" in found.notes[0]
+    assert (read_picture(path, ReadOptions(scalars="image")).values == PLANE).all()
+    inside = read_picture(path / "labels" / "cells")
+    assert inside.labels
+    assert (inside.values == found.values).all()
+    add_labels(path, version, ["cells", "nuclei"])
+    with pytest.raises(InputError, match="cells, nuclei"):
+        read_picture(path)
+    assert (read_picture(path, ReadOptions(scalars="nuclei")).values == PLANE.astype(int) + 6).all()
+
+
+def test_plain_zarr_arrays_and_groups_of_pictures(tmp_path: Path) -> None:
+    zarr = pytest.importorskip("zarr")
+    array = zarr.create_array(tmp_path / "p.zarr", shape=PLANE.shape, dtype=PLANE.dtype)
+    array[...] = PLANE
+    assert (read_picture(tmp_path / "p.zarr").values == PLANE).all()
+    group = zarr.open_group(tmp_path / "g.zarr", mode="w")
+    group.create_group("a")
+    with pytest.raises(InputError, match="it holds a"):
+        read_picture(tmp_path / "g.zarr")
+    write_ome(tmp_path / "g.zarr" / "0", "0.5", PLANE, "yx")
+    assert (read_picture(tmp_path / "g.zarr").values == PLANE).all()
+
+
+@pytest.mark.parametrize("codec", ["zlib", "gzip", "blosc", "zstd"])
+def test_chunks_of_zarr_that_unpack_to_far_more_are_refused(tmp_path: Path, codec: str) -> None:
+    zarr = pytest.importorskip("zarr")
+    numcodecs = pytest.importorskip("numcodecs")
+    packer = {"zlib": numcodecs.Zlib, "gzip": numcodecs.GZip, "blosc": numcodecs.Blosc, "zstd": numcodecs.Zstd}[codec]()
+    array = zarr.create_array(
+        tmp_path / "a.zarr", shape=PLANE.shape, dtype=PLANE.dtype, chunks=(20, 30), zarr_format=2, compressors=packer
+    )
+    array[...] = PLANE
+    chunk = next(path for path in (tmp_path / "a.zarr").rglob("*") if path.is_file() and not path.name.startswith("."))
+    chunk.write_bytes(packer.encode(bytes(200_000_000)))
+    with pytest.raises(InputError, match="unpacks to more"):
+        read_picture(tmp_path / "a.zarr")
+
+
+# ---------------------------------------------------------------------------------------------------- HDF5
+
+
+def write_oina(path: Path, rows: int = 12, cols: int = 20) -> Path:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        file["Format Version"] = [b"5.0"]
+        header, data = file.create_group("1/EBSD/Header"), file.create_group("1/EBSD/Data")
+        for name, value in (("X Cells", cols), ("Y Cells", rows), ("X Step", 0.2), ("Y Step", 0.2)):
+            header[name] = np.array([value])
+        for k, (name, laue) in enumerate((("Iron bcc", 11), ("Quartz", 7)), 1):
+            phase = header.create_group(f"Phases/{k}")
+            phase["Phase Name"], phase["Laue Group"] = [name.encode()], np.array([laue], np.int32)
+        phase = np.ones((rows, cols), np.uint8)
+        phase[:, 9:] = 2
+        phase[2, 3] = 0
+        euler = np.zeros((rows, cols, 3), np.float32)
+        euler[6:] = 0.7
+        data["Phase"], data["Euler"] = phase.reshape(-1, 1), euler.reshape(-1, 3)
+        data["Band Contrast"] = np.full((rows * cols, 1), 9, np.uint8)
+    return path
+
+
+def test_an_h5oina_map(tmp_path: Path) -> None:
+    path = write_oina(tmp_path / "a.h5oina")
+    found = read_picture(path)
+    assert found.names == {1: "Iron bcc", 2: "Quartz"}
+    assert found.void is not None
+    assert np.argwhere(found.void).tolist() == [[2, 3]]
+    assert size_text(path) == "0.2 um"
+    grains = read_picture(path, ReadOptions(scalars="grains"))
+    assert grains.values.max() == 4
+    assert grains.crystals is not None
+    assert np.allclose(np.radians(grains.crystals[4].euler), 0.7, atol=1e-4)
+
+
+def write_dream3d(path: Path, **options: Any) -> Path:
+    h5py = pytest.importorskip("h5py")
+    ids = np.ones((1, 20, 30, 1), np.int32)
+    ids[0, :, 10:] = 2
+    ids[0, 0, 0] = 0
+    euler = np.zeros((1, 20, 30, 3), np.float32)
+    euler[0, :, 10:] = (0.4, 0.2, 0.1)
+    with h5py.File(path, "w") as file:
+        cells = file.create_group("DataContainers/Synthetic/CellData")
+        cells.create_dataset("FeatureIds", data=ids, **options)
+        cells["EulerAngles"], cells["Phases"] = euler, np.ones_like(ids)
+        cells["Confidence Index"] = np.random.default_rng(0).random(ids.shape).astype(np.float32)
+        file["DataContainers/Synthetic/_SIMPL_GEOMETRY/SPACING"] = np.array([0.25, 0.25, 1.0], np.float32)
+        ensemble = file.create_group("DataContainers/Synthetic/CellEnsembleData")
+        ensemble["CrystalStructures"] = np.array([[999], [1]], np.uint32)
+        ensemble["PhaseName"] = [b"Unknown", b"Nickel"]
+    return path
+
+
+def test_dream3d_gives_its_grains_and_any_other_array(tmp_path: Path) -> None:
+    path = write_dream3d(tmp_path / "a.dream3d")
+    found = read_picture(path)
+    assert found.labels
+    assert found.names == {1: "Nickel_1", 2: "Nickel_2"}
+    assert found.void is not None
+    assert np.argwhere(found.void).tolist() == [[0, 0]]  # feature 0 is none
+    assert found.crystals is not None
+    assert np.allclose(np.radians(found.crystals[2].euler), (0.4, 0.2, 0.1), atol=1e-5)
+    assert size_text(path) == "0.25"
+    assert not read_picture(path, ReadOptions(scalars="Confidence Index")).labels
+    with pytest.raises(InputError, match="channel = 0 to 2"):
+        read_picture(path, ReadOptions(scalars="EulerAngles"))
+    with pytest.raises(InputError, match=r"scalars is 'Nothing', but .*FeatureIds"):
+        read_picture(path, ReadOptions(scalars="Nothing"))
+
+
+def test_other_hdf5_files_name_their_arrays(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["exported_data"] = VOLUME
+        file["a/b"] = PLANE
+    with pytest.raises(InputError, match=r"2 arrays .*a/b, exported_data"):
+        read_picture(tmp_path / "a.h5")
+    assert (read_picture(tmp_path / "a.h5", ReadOptions(scalars="exported_data", frame=1)).values == PLANE).all()
+    assert (read_picture(tmp_path / "a.h5", ReadOptions(scalars="b")).values == PLANE).all()
+
+
+def test_chunks_of_hdf5_that_unpack_to_far_more_are_refused(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = write_dream3d(tmp_path / "a.dream3d", chunks=(1, 20, 30, 1), compression="gzip")
+    assert read_picture(path).labels
+    with h5py.File(path, "r+") as file:
+        dataset = file["DataContainers/Synthetic/CellData/FeatureIds"]
+        dataset.id.write_direct_chunk((0, 0, 0, 0), zlib.compress(bytes(200_000_000), 9))
+    with pytest.raises(InputError, match="unpacks to more"):
+        read_picture(path)
+
+
+# --------------------------------------------------------------------------------------------------- NumPy
+
+
+def test_an_archive_of_arrays(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "one.npz", labels=PLANE)
+    assert (read_picture(tmp_path / "one.npz").values == PLANE).all()
+    np.savez(tmp_path / "two.npz", labels=PLANE, other=VOLUME)
+    with pytest.raises(InputError, match=r"2 arrays .*labels, other"):
+        read_picture(tmp_path / "two.npz")
+    assert (read_picture(tmp_path / "two.npz", ReadOptions(scalars="other", frame=1)).values == PLANE).all()
+    np.savez_compressed(tmp_path / "bomb.npz", labels=np.zeros(400_000_000, np.uint8).reshape(20000, 20000))
+    with pytest.raises(InputError, match="raise"):
+        read_picture(tmp_path / "bomb.npz", ReadOptions(max_pixels=10_000))
+
+
+# ------------------------------------------------------------------------------------------- other formats
+
+
+@pytest.mark.parametrize("extension", sorted(CONVERTED_BY))
+def test_what_is_not_read_names_the_line_that_converts_it(tmp_path: Path, extension: str) -> None:
+    path = tmp_path / f"a{extension}"
+    path.write_bytes(b"1 2 3\n" * 40)
+    with pytest.raises(InputError, match="not read directly") as told:
+        read_picture(path)
+    assert "FILE" not in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_a_picture_of_a_wrong_name_is_told_by_its_content(tmp_path: Path) -> None:
+    Image.fromarray(PLANE).save(tmp_path / "a.png")
+    shutil.copy(tmp_path / "a.png", tmp_path / "a.csv")
+    assert (read_picture(tmp_path / "a.csv").values == PLANE).all()
+    tifffile.imwrite(tmp_path / "b.tif", PLANE)
+    shutil.copy(tmp_path / "b.tif", tmp_path / "b.png")
+    assert (read_picture(tmp_path / "b.png").values == PLANE).all()
+
+
+def test_16_bit_colours_of_a_png_come_whole_or_are_told(tmp_path: Path) -> None:
+    deep = np.stack([PLANE, PLANE + 1, PLANE + 2], axis=-1).astype(np.uint16) * 256 + 7
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in deep)
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    head = struct.pack(">IIBBBBB", 30, 20, 16, 2, 0, 0, 0)
+    path = tmp_path / "a.png"
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    )
+    found = read_picture(path)
+    if found.values.dtype == np.uint16:
+        assert (found.values == deep).all()
+    else:
+        assert (found.values == deep >> 8).all()
+        assert "upper 8" in found.notes[0]
+
+
+def test_an_orientation_that_is_older_than_the_pixels_is_not_followed(tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif[274] = 6
+    exif.get_ifd(0x8769).update({40962: 20, 40963: 30})  # as it was before a program turned the pixels
+    Image.fromarray(PLANE).save(tmp_path / "stale.png", exif=exif)
+    found = read_picture(tmp_path / "stale.png")
+    assert (found.values == PLANE).all()
+    assert "older than the pixels" in found.notes[0]
+    exif.get_ifd(0x8769).update({40962: 30, 40963: 20})
+    Image.fromarray(PLANE).save(tmp_path / "turned.png", exif=exif)
+    assert read_picture(tmp_path / "turned.png").shape == (30, 20)
+
+
+# ------------------------------------------------------------------------------------------- hostile files
+
+Writer = Callable[[Path], Path]
+
+
+def _written_nifti(path: Path) -> Path:
+    nibabel = pytest.importorskip("nibabel")
+    nibabel.save(nibabel.Nifti1Image(VOLUME.T.copy(), np.eye(4)), path)
+    return path
+
+
+def _written_mrc(path: Path) -> Path:
+    mrcfile = pytest.importorskip("mrcfile")
+    with mrcfile.new(path, overwrite=True) as file:
+        file.set_data(VOLUME.astype(np.float32))
+    return path
+
+
+def _written_npz(path: Path) -> Path:
+    np.savez_compressed(path, a=VOLUME)
+    return path
+
+
+FILES: dict[str, Writer] = {
+    "a.nrrd": lambda path: write_nrrd(path, VOLUME, encoding="raw"),
+    "g.nrrd": lambda path: write_nrrd(path, VOLUME, encoding="gzip"),
+    "a.nii": _written_nifti,
+    "a.nii.gz": _written_nifti,
+    "a.mrc": _written_mrc,
+    "a.h5oina": write_oina,
+    "a.dream3d": write_dream3d,
+    "a.npz": _written_npz,
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_cut_and_scrambled_files_are_one_line_errors_or_pictures(tmp_path: Path, name: str) -> None:
+    whole = FILES[name](tmp_path / name).read_bytes()
+    rng = np.random.default_rng(4)
+    cut = [whole[:n] for n in (1, 4, 20, 100, 200, 348, 400, len(whole) // 2, len(whole) - 40, len(whole) - 1)]
+    scrambled = []
+    for _ in range(30):
+        bytes_ = np.frombuffer(whole, np.uint8).copy()
+        at = rng.integers(0, min(len(bytes_), 1500), 6)
+        bytes_[at] = rng.integers(0, 256, 6)
+        scrambled.append(bytes_.tobytes())
+    path = tmp_path / f"x{name[1:]}"
+    for content in (*cut, *scrambled):
+        path.write_bytes(content)
+        assert is_one_line_or_picture(path)
+
+
+def is_one_line_or_picture(path: Path) -> bool:
+    try:
+        return min(read_picture(path, ReadOptions(frame=1 if "nrrd" in path.name else None)).shape) > 0
+    except InputError as error:
+        return "\n" not in str(error) and path.name in str(error)
+
+
+def test_headers_that_promise_too_much_are_refused_before_memory_is_used(tmp_path: Path) -> None:
+    path = write_nrrd(tmp_path / "a.nrrd", PLANE, encoding="gzip")
+    path.write_bytes(path.read_bytes().replace(b"sizes: 30 20", b"sizes: 900000 900000"))
+    with pytest.raises(InputError, match="more than max_pixels"):
+        read_picture(path)
+    path.write_bytes(path.read_bytes().replace(b"sizes: 900000 900000", b"sizes: 9000 9000"))
+    with pytest.raises(InputError, match=r"cut off"):
+        read_picture(path)
+    header = bytearray(_written_nifti(tmp_path / "a.nii").read_bytes())
+    header[42:46] = struct.pack("<hh", 32000, 32000)
+    (tmp_path / "a.nii").write_bytes(header)
+    with pytest.raises(InputError, match="more than max_pixels"):
+        read_picture(tmp_path / "a.nii", ReadOptions(frame=0))
+
+
+@pytest.mark.parametrize("name", [".zgroup", ".zattrs", "s0/.zarray", "s0/0.0"])
+def test_broken_parts_of_a_zarr_folder_are_one_line_errors(tmp_path: Path, name: str) -> None:
+    for k, content in enumerate(
+        (b"", b"{", b"[]", b'{"multiscales": [{"datasets": [{"path": "../.."}]}]}', b"\xff" * 99)
+    ):
+        path = write_ome(tmp_path / f"a{k}.zarr", "0.4", PLANE, "yx")
+        target = path / name
+        assert target.parent.is_dir()
+        target.write_bytes(content)
+        try:
+            read_picture(path)
+        except InputError as error:
+            assert "\n" not in str(error)  # noqa: PT017
