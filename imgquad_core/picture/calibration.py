@@ -153,7 +153,7 @@ def _parts(size: Any) -> tuple[Any, ...]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, Real) and type(value) is not bool and isfinite(value)
+    return type(value) is not bool and isinstance(value, Real) and isfinite(value)
 
 
 def asked_placement(

@@ -103,13 +103,18 @@ def segmented(
     name, _ = scalars_of(image, scalars)
     values, options = image_array(image, name), options or core.picture.SegmentationOptions()
     if name != MATERIAL or NUMBERS not in image.field_data or options.colors not in ("auto", "exact"):
-        return core.picture.segment_picture(_picture(image, name, values), options)
+        return _segmented(_picture(image, name, values), options)
     materials = materials_of(image)
     unknown = np.setdiff1d(values, [-1, *materials.labels])
     if len(unknown):
         raise InputError(f"array 'material' holds {unknown[0]}, 'material_numbers' does not: segment the image anew")
     quantised = QUANTISED in image.field_data and bool(image.field_data[QUANTISED].any())
     return core.picture.Segmentation(LabelImage(values, materials), quantised)
+
+
+def _segmented(raw: core.picture.Picture, options: core.picture.SegmentationOptions) -> core.picture.Segmentation:
+    found = core.picture.segment_picture(raw, options)
+    return replace(found, image=core.picture.as_told(found.image, raw))
 
 
 def _picture(image: pv.ImageData, name: str, values: NDArray[Any]) -> core.picture.Picture:

@@ -35,7 +35,18 @@ CALLS: dict[str, Callable[..., Any]] = {
     "generate_quad_mesh_from_image": lambda **k: filters.mesh(IMAGE, **k),
 }
 #: PyVista has its own ways: extract_subset, spacing, and the image is in memory already
-ELSEWHERE = {"crop", "pixel_size", "max_pixels", "frame"}
+ELSEWHERE = {
+    "crop",
+    "pixel_size",
+    "origin",
+    "max_pixels",
+    "frame",
+    "channel",
+    "level",
+    "scalars",
+    "info_bar",
+    "grain_angle",
+}
 
 NONSENSE: dict[str, list[Any]] = {
     "Real": ["x", float("nan"), float("inf"), -1, 1j, [1, 2], {}],
