@@ -204,7 +204,7 @@ def read_source(source: Source, options: ReadOptions | None = None) -> Picture |
 
 
 def segment_source(raw: Picture | LabelImage, options: SegmentationOptions | None = None) -> Segmentation:
-    """Segment what `read_source` gave; names, crystals and void of its file stay."""
+    """Segment what `read_source` gave; names and crystals of its file stay."""
     found = segment_picture(raw, options)
     return replace(found, image=as_told(found.image, raw)) if isinstance(raw, Picture) else found
 

@@ -1,4 +1,4 @@
-"""What a file says of its labels - names, crystals, pixels without any - handed on to the materials."""
+"""What a file says of its labels, names and crystals, handed on to the materials."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from imgquad_core.arrays import Floats
-from imgquad_core.model import VOID, LabelImage, Materials
+from imgquad_core.model import LabelImage, Materials
 
 from .picture import Crystal, Picture
 
 
 def as_told(image: LabelImage, picture: Picture) -> LabelImage:
-    """Return a segmented picture with the names and crystals of its labels, void where the file has no value.
+    """Return a segmented picture with the names and crystals that its file gives its labels.
 
     Parameters
     ----------
@@ -22,10 +22,7 @@ def as_told(image: LabelImage, picture: Picture) -> LabelImage:
     picture : Picture
         As it was read.
     """
-    labels = image.labels
-    if picture.void is not None and (labels[picture.void] != VOID).any():
-        labels = np.where(picture.void, np.int32(VOID), labels)
-    return LabelImage(labels, named(image.materials, picture.names or {}, picture.crystals or {}))
+    return LabelImage(image.labels, named(image.materials, picture.names or {}, picture.crystals or {}))
 
 
 def named(materials: Materials, names: Mapping[int, str], crystals: Mapping[int, Crystal]) -> Materials:
