@@ -156,13 +156,23 @@ def check(options: Any) -> None:
 
 SIZE = Declaration(4.0, "length of the final edges, in pixels", float, "a length", least=0.05, unit="px")
 GROWTH = Declaration(
-    1.3, "largest ratio of the sizes of neighbouring elements", float, "a ratio", least=1.01, most=10.0
+    1.3,
+    "largest ratio of the sizes of neighbouring elements; inside regions up to 1.6",
+    float,
+    "a ratio",
+    least=1.01,
+    most=10.0,
 )
 MATERIAL_SIZES = replace(
     SIZE,
     default=None,
     help="length of the final edges in single materials, by name or number, in pixels",
     each="size of material {}",
+)
+SIZES_BETWEEN = replace(
+    MATERIAL_SIZES,
+    help="length of the final edges on boundaries between two materials, by names or numbers, in pixels",
+    each="size between {}",
 )
 POLICIES = ("minority", "majority", "lower", "diagonal", "junction")
 POLICY = Declaration(

@@ -117,7 +117,7 @@ class BoundaryGraph:
     region_pixels : int64, shape (n_regions,)
         Pixels of each region in the picture: the area that smoothing keeps.
     shape : tuple of int
-        (n_rows, n_cols) of the picture.
+        (n_rows, n_cols) of the picture; fractions of a data point while boundaries are smoothed.
 
     Notes
     -----

@@ -14,6 +14,7 @@ from .declared import check, option, same_as
 from .errors import InputError
 from .mesher import EFFORTS, MeshingOptions
 from .picture import (
+    AbsorbOptions,
     Calibration,
     DenoiseOptions,
     ReadOptions,
@@ -36,11 +37,15 @@ class MeshOptions:
     size : float
         Length of the final edges.
     boundary_size : float, optional
-        The same on boundaries; `size` by default.
+        The same on boundaries inside the picture; `size` by default.
+    frame_size : float, optional
+        The same on the picture's border; `size` by default.
     material_sizes : mapping of (str or int) to float
         The same in single materials, by name or number.
+    sizes_between : mapping of (str or int, str or int) to float
+        The same on the boundaries between two materials, before all others.
     growth : float
-        Largest ratio of the sizes of neighbouring elements.
+        Largest ratio of the sizes of neighbouring elements; above 1.6 it counts as 1.6 inside regions.
     colors : "auto", "exact", "regions", int or sequence of RGB
         How colours become materials; see `SegmentationOptions`.
     flatten : "auto" or "off"
@@ -60,7 +65,19 @@ class MeshOptions:
     edge_ratio : float
         Largest ratio of the lengths of neighbouring edges on a boundary.
     max_shift : float
-        How far smoothing moves a boundary at most.
+        How far smoothing moves a boundary at most, in data points.
+    step : "auto", float or (float, float)
+        Width of the picture's data points in pixels, or width and height: stairs of these are smoothed as those of
+        pixels are. "auto" sees it, see `find_step`; 1 takes pixels as they are. Noise limits and `max_shift` count
+        data points.
+    tolerance : float
+        Parts of the picture that are thinner go to their neighbours, boundaries shorter than this between two junctions
+        are joined, and outlines smoothed over half of it; see `absorb_thin`. 0: the picture is taken at its word.
+    keep : sequence of str or int
+        Materials that `tolerance` takes no pixels from.
+    join : float, optional
+        Boundaries shorter than this between two junctions are joined to one, where sectors around it stay wide; twice
+        `max_shift` or the tolerance by default, 0 for none.
     pixel_size : float, (float, float), "auto", "file" or "file:UNIT"
         Length of a pixel in the unit of the mesh; width and height where they differ. Lengths in pixels then mean the
         shorter side. "file": what the file says, in its own unit or in another; "auto": that of a map (GeoTIFF in a
@@ -93,8 +110,12 @@ class MeshOptions:
 
     size: float = same_as(SmoothingOptions, "size")
     boundary_size: float | None = same_as(SmoothingOptions, "boundary_size")
+    frame_size: float | None = same_as(SmoothingOptions, "frame_size")
     material_sizes: Mapping[str | int, float] = same_as(
         SmoothingOptions, "material_sizes", default=MappingProxyType({})
+    )
+    sizes_between: Mapping[tuple[str | int, str | int], float] = same_as(
+        SmoothingOptions, "sizes_between", default=MappingProxyType({})
     )
     growth: float = same_as(SmoothingOptions, "growth")
     colors: Any = same_as(SegmentationOptions, "colors")
@@ -121,6 +142,10 @@ class MeshOptions:
     policy: str = same_as(ExtractionOptions, "policy")
     edge_ratio: float = same_as(SmoothingOptions, "edge_ratio")
     max_shift: float = same_as(SmoothingOptions, "max_shift")
+    step: Literal["auto"] | float | tuple[float, float] = same_as(SmoothingOptions, "step")
+    tolerance: float = same_as(AbsorbOptions, "tolerance")
+    keep: tuple[str | int, ...] = same_as(AbsorbOptions, "keep")
+    join: float | None = same_as(SmoothingOptions, "join")
     pixel_size: float | tuple[float, float] | str = option(
         "auto",
         "length of a pixel in the unit of the mesh, width and height where they differ (sizes in pixels then mean the "
@@ -166,12 +191,16 @@ class MeshOptions:
         assert_placement(self.pixel_size, self.origin)
         if self.crop is not None and not _is_box(self.crop):
             raise InputError(f"crop is {self.crop!r}; give left, upper, right and lower bound in whole pixels")
-        dropped: object = self.drop
-        if isinstance(dropped, str) or not isinstance(dropped, Iterable):
-            raise InputError(f"drop is {self.drop!r}; give a tuple of names or numbers of materials")
+        for name, listed in (("drop", self.drop), ("keep", self.keep)):
+            materials: object = listed
+            if isinstance(materials, str) or not isinstance(materials, Iterable):
+                raise InputError(f"{name} is {listed!r}; give a tuple of names or numbers of materials")
+        if not all(isinstance(pair, tuple) and len(pair) == 2 for pair in self.sizes_between):
+            raise InputError(f"sizes_between has {list(self.sizes_between)!r}; give pairs of materials, as (1, 2)")
         # each stage checks its own options: now, not after minutes of work
         self.meshing(None)
-        self.smoothing(None)
+        self.smoothing(None, self.step)
+        self.absorbing(None)
         self.segmentation()
         self.reading()
         ExtractionOptions(self.policy)
@@ -238,15 +267,27 @@ class MeshOptions:
             policy=self.policy,
         )
 
-    def smoothing(self, materials: Materials | None) -> SmoothingOptions:
-        """Return the options of smoothing."""
+    def absorbing(self, materials: Materials | None, step: float = 1.0) -> AbsorbOptions:
+        """Return the options of absorbing, for data points of a width."""
+        keep = tuple(picture.material_number(materials, name) for name in self.keep) if materials else ()
+        return AbsorbOptions(self.tolerance, keep, self.policy, step)
+
+    def smoothing(
+        self, materials: Materials | None, step: Literal["auto"] | float | tuple[float, float]
+    ) -> SmoothingOptions:
+        """Return the options of smoothing, for data points of a width and a height."""
         return SmoothingOptions(
             size=self.size,
             boundary_size=self.boundary_size,
+            frame_size=self.frame_size,
             growth=self.growth,
             edge_ratio=self.edge_ratio,
             max_shift=self.max_shift,
             material_sizes=self._sizes(materials),
+            sizes_between=self._sizes_between(materials),
+            step=step,
+            tolerance=self.tolerance,
+            join=self.join,
             edge_multiple=EFFORTS[self.effort].edge_multiple,
         )
 
@@ -265,6 +306,11 @@ class MeshOptions:
         if materials is None:  # only the values are checked
             return dict(enumerate(self.material_sizes.values()))
         return picture.sizes_by_number(materials, self.material_sizes)
+
+    def _sizes_between(self, materials: Materials | None) -> dict[tuple[int, int], float]:
+        if materials is None:
+            return {(k, k + 1): size for k, size in enumerate(self.sizes_between.values())}
+        return picture.sizes_by_numbers(materials, self.sizes_between)
 
 
 def _is_box(box: Any) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,18 +17,24 @@ from . import ahead
 from .boundary import (
     ExtractionOptions,
     SmoothingOptions,
+    Step,
     TrueShape,
+    as_step,
     extract_boundaries,
+    find_step,
     match_opposite_sides,
     rematch,
     smooth_boundaries,
     true_shape,
 )
 from .errors import InputError
+from .geometry.corner_rule import corner_rule
 from .mesher import MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .options import MeshOptions
 from .picture import (
+    Absorbed,
+    Absorption,
     Box,
     Calibration,
     DenoiseOptions,
@@ -37,10 +43,13 @@ from .picture import (
     Removal,
     Segmentation,
     SegmentationOptions,
+    absorb_thin,
+    areas_of_origin,
     as_told,
     assert_solid,
     crop_image,
     drop_materials,
+    enlarged_labels,
     list_removed,
     picture_of,
     read_picture,
@@ -53,8 +62,14 @@ from .picture import (
 Source: TypeAlias = "str | Path | NDArray[Any] | LabelImage | Picture"
 #: called with the name of the stage that starts, its number from 0, and the number of stages
 Progress: TypeAlias = Callable[[str, int, int], None]
-STAGES = ("read", "segment", "denoise", "boundary", "smooth", "mesh")
+STAGES = ("read", "segment", "denoise", "absorb", "boundary", "smooth", "mesh")
 MOST_QUADS = 200_000_000  #: more are refused before memory is
+MUCH, MATTERS = 0.5, 0.01  #: share of a material that is lost, and of the picture that it had, from which it is told
+_REMEDIES = "remove noise (min-pixels, min-length), ask for a smaller size or raise the tolerance"
+_FIRST_REMEDY = (
+    "remove noise (min-pixels, min-length), ask for a smaller size, set tolerance {:g} (half the size), which gives "
+    "what is thinner to its neighbours"
+)
 MANY_TIMES, MANY_QUADS = 4.0, 1000  #: quads over area / size^2, and in all, from which thin features are told
 
 
@@ -70,10 +85,16 @@ class Run:
         The picture as segmented, and what was chosen.
     picture : LabelImage
         The part that was asked for, before noise removal.
+    step : tuple of float
+        Width and height of data points, in pixels.
     noise : DenoiseOptions
         The limits of noise that were used.
     removed : tuple of Removal
         Noise that was removed, by material.
+    clean : LabelImage
+        The picture without noise.
+    absorbed : tuple of Absorption
+        What went to neighbours for the sake of the tolerance, by material.
     labels : LabelImage
         The materials as meshed.
     pixel_boundary, boundary : BoundaryGraph
@@ -96,8 +117,11 @@ class Run:
     options: MeshOptions
     segmentation: Segmentation
     picture: LabelImage
+    step: Step
     noise: DenoiseOptions
     removed: tuple[Removal, ...]
+    clean: LabelImage
+    absorbed: tuple[Absorption, ...]
     labels: LabelImage
     pixel_boundary: BoundaryGraph
     boundary: BoundaryGraph
@@ -165,15 +189,20 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
     picture = crop_image(found.image, crop) if crop else found.image
     calibration, notes = _what_the_file_says(raw, crop, options)
     options = options.placed(calibration, raw.name if isinstance(raw, Picture) else "the picture")
-    noise = options.noise(found.quantised, found.image.shape)
     with timed("denoise"):
+        step = step_of(picture, options)
+        noise = options.noise(found.quantised, found.image.shape).scaled(step)
         clean = remove_noise(picture, noise)
-    labels = drop_materials(clean, options.drop)
-    smoothing, meshing = options.smoothing(picture.materials), options.meshing(picture.materials)
+    with timed("absorb"):
+        absorbed = absorb_thin(clean, options.absorbing(picture.materials, noise.step))
+    labels = drop_materials(absorbed.image, options.drop)
+    step = step[0] * absorbed.times, step[1] * absorbed.times
+    smoothing, meshing = options.smoothing(picture.materials, step), options.meshing(picture.materials)
     true = true_shape(labels.shape, options.pixel_sides)
     _assert_feasible(true.shape, smoothing.size)
     with timed("boundary"):
-        staircase = extract(labels, ExtractionOptions(options.policy))
+        extraction = ExtractionOptions(options.policy, noise.step * absorbed.times)
+        staircase = extract_simplified(clean, absorbed, options.drop, extraction)
     with timed("smooth"):
         boundary = smooth(staircase, smoothing, true, options.periodic)
     with timed("mesh"):
@@ -182,8 +211,11 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
         options=options,
         segmentation=found,
         picture=picture,
+        step=(step[0] / absorbed.times, step[1] / absorbed.times),
         noise=noise,
-        removed=list_removed(picture, clean, options.policy),
+        removed=list_removed(picture, clean, noise.policy, noise.step),
+        clean=clean,
+        absorbed=absorbed.materials,
         labels=labels,
         pixel_boundary=staircase,
         boundary=boundary,
@@ -215,13 +247,50 @@ def extract(labels: LabelImage, options: ExtractionOptions | None = None) -> Bou
     return extract_boundaries(labels, options)
 
 
+def step_of(picture: LabelImage, options: MeshOptions) -> Step:
+    """Return width and height of the picture's data points: as asked for, or as seen."""
+    if options.step != "auto":
+        return as_step(options.step)
+    return find_step(extract(picture, ExtractionOptions(options.policy)))
+
+
+def extract_simplified(
+    clean: LabelImage, absorbed: Absorbed, drop: Sequence[str | int], options: ExtractionOptions
+) -> BoundaryGraph:
+    """Return the pixel boundary of a picture whose thin parts were absorbed.
+
+    Parameters
+    ----------
+    clean : LabelImage
+        Before they were.
+    absorbed : Absorbed
+        After.
+    drop : sequence of str or int
+        Materials that are left out.
+    options : ExtractionOptions
+        What to do with ambiguous places.
+
+    Returns
+    -------
+    BoundaryGraph
+        Of `absorbed.enlarged`; the pixels of a region are those of what it is the rest of, which smoothing restores.
+    """
+    enlarged = drop_materials(absorbed.enlarged, drop)
+    graph = extract(enlarged, options)
+    if not absorbed.materials:
+        return graph
+    before = enlarged_labels(clean.labels, absorbed.times)
+    areas = areas_of_origin(before, enlarged.labels, corner_rule(options.policy, options.step))
+    return replace(graph, region_pixels=np.rint(areas).astype(np.int64))
+
+
 def smooth(
     graph: BoundaryGraph, options: SmoothingOptions, true: TrueShape | None = None, periodic: str = "none"
 ) -> BoundaryGraph:
     """Return smooth boundaries cut into edges, in true shape, with opposite sides alike where they are periodic."""
     shape = graph.shape if true is None else true.shape
     _assert_feasible(shape, options.size)
-    graph = smooth_boundaries(graph, options, None if shape == graph.shape else shape)
+    graph = smooth_boundaries(graph, options, shape)
     return match_opposite_sides(graph, periodic) if periodic != "none" else graph
 
 
@@ -266,7 +335,18 @@ def thin_features(labels: LabelImage, mesh: QuadMesh, options: MeshOptions) -> s
         return None
     return (
         f"thin features force {mesh.n_quads} quads, {mesh.n_quads / expected:.1f} times area / size^2: "
-        "remove noise (min-pixels, min-length), ask for a smaller size, or drop or merge materials"
+        f"{_REMEDIES if options.tolerance else _FIRST_REMEDY.format(0.5 * options.size)}, or drop or merge materials"
+    )
+
+
+def lost_materials(done: Run) -> tuple[str, ...]:
+    """Name the materials that a tolerance took half or more of, with the remedies."""
+    names, n_pixels = done.clean.materials.name_of, done.clean.labels.size
+    return tuple(
+        f"material {names(row.material)} loses {row.lost / row.pixels:.0%} of its area: it is thinner than "
+        f"{done.options.tolerance:g} px; keep it (keep {names(row.material)}) or lower the tolerance"
+        for row in done.absorbed
+        if row.lost > MUCH * row.pixels and (row.pixels >= MATTERS * n_pixels or row.absorbed == row.regions)
     )
 
 

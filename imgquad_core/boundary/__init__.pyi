@@ -3,15 +3,19 @@ from .extraction import extract_boundaries
 from .options import ExtractionOptions, SmoothingOptions
 from .periodic import DIRECTIONS, match_opposite_sides, rematch
 from .smoothing import smooth_boundaries
+from .stairs import Step, as_step, find_step
 from .true_shape import TrueShape, true_shape
 
 __all__ = [
     "DIRECTIONS",
     "ExtractionOptions",
     "SmoothingOptions",
+    "Step",
     "TrueShape",
+    "as_step",
     "enclosed_areas",
     "extract_boundaries",
+    "find_step",
     "match_opposite_sides",
     "rematch",
     "smooth_boundaries",

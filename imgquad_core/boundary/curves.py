@@ -12,6 +12,21 @@ from imgquad_core.jit import kernel, verb
 from imgquad_core.model import BoundaryGraph, PointKind
 
 _LONGEST_RUN = 16  # sides from step to step that count
+#: what a dense point is: corner of a pixel, middle of a horizontal or vertical side, or none of these
+PIXEL_CORNER, ACROSS, UP, ELSEWHERE = -1, 0, 1, 2
+
+
+class PixelChains(NamedTuple):
+    """The boundary that is smoothed, and what its dense points are."""
+
+    graph: BoundaryGraph
+    side: Ints  #: (n,) one of the above for each place of `graph.chain_points`
+
+
+def pixel_chains(graph: BoundaryGraph) -> PixelChains:
+    """Tell what the points of a pixel boundary are: the middle of a horizontal side lies on half columns."""
+    is_half = graph.points[graph.chain_points] % 1.0 != 0.0
+    return PixelChains(graph, np.where(is_half[:, 0], ACROSS, np.where(is_half[:, 1], UP, PIXEL_CORNER)))
 
 
 class Curves(NamedTuple):
@@ -37,8 +52,9 @@ class Ends(NamedTuple):
     sockets: Ints  #: 2 * chain + 0 for its start or 1 for its end
 
 
-def curves_of(graph: BoundaryGraph) -> tuple[Curves, Ends]:
+def curves_of(chains: PixelChains) -> tuple[Curves, Ends]:
     """Unpack a pixel boundary."""
+    graph = chains.graph
     raw = graph.points[graph.chain_points]
     first, last = graph.chain_points[graph.chain_offsets[:-1]], graph.chain_points[graph.chain_offsets[1:] - 1]
     is_node = (graph.point_kind == PointKind.JUNCTION) | (graph.point_kind == PointKind.CORNER)
@@ -52,7 +68,7 @@ def curves_of(graph: BoundaryGraph) -> tuple[Curves, Ends]:
     curves = Curves(
         raw,
         arc_lengths(raw, np.array(graph.chain_offsets)),
-        sample_weights(raw, np.array(graph.chain_offsets)),
+        sample_weights(chains.side, np.array(graph.chain_offsets)),
         np.array(graph.chain_offsets),
         ends,
         graph.point_kind[second] == PointKind.FRAME,
@@ -63,6 +79,19 @@ def curves_of(graph: BoundaryGraph) -> tuple[Curves, Ends]:
         np.concatenate([[0], np.cumsum(np.bincount(at, minlength=len(nodes)))]).astype(np.int64),
         sockets[np.argsort(at, kind="stable")],
     )
+
+
+def numbered(offsets: Ints, node: Ints, n_nodes: int) -> Ints:
+    """Give ids to the points of chains between nodes, shape (n_chains, 2), -1 closed: nodes first, others in order."""
+    is_closed = node[:, 0] < 0
+    is_inner = np.ones(offsets[-1], bool)
+    is_inner[offsets[:-1][~is_closed]] = False
+    is_inner[offsets[1:] - 1] = False
+    ids = np.empty(len(is_inner), np.int64)
+    ids[is_inner] = n_nodes + np.arange(np.count_nonzero(is_inner))
+    ids[offsets[:-1][~is_closed]], ids[offsets[1:][~is_closed] - 1] = node[~is_closed].T
+    ids[offsets[1:][is_closed] - 1] = ids[offsets[:-1][is_closed]]
+    return ids
 
 
 @kernel
@@ -76,7 +105,7 @@ def arc_lengths(points: Floats, offsets: Ints) -> Floats:
 
 
 @kernel
-def sample_weights(points: Floats, offsets: Ints) -> Floats:
+def sample_weights(side: Ints, offsets: Ints) -> Floats:
     """Weight of each point as an observation of the true boundary.
 
     A mid-side is off by up to half a pixel ACROSS its side only. Of a nearly straight boundary with runs of r sides
@@ -88,35 +117,27 @@ def sample_weights(points: Floats, offsets: Ints) -> Floats:
 
     Corners of pixels between two sides of a run lie halfway between their samples and say nothing: weight 0.
     """
-    weight = np.zeros(len(points))
-    run = np.zeros(len(points), np.int64)
+    weight = np.zeros(len(side))
+    run = np.zeros(len(side), np.int64)
     for c in range(len(offsets) - 1):
         first, last = offsets[c], offsets[c + 1] - 1
         weight[first] = weight[last] = 1.0
         begin, kind, length = first, -1, 0
         for i in range(first, last + 2):
-            this = 2 if i > last else _side(points, i)
+            this = 3 if i > last else side[i]
             if this < 0:
                 continue
             if this != kind:
                 for k in range(begin, i):
-                    run[k] = length
+                    run[k] = length if kind < ELSEWHERE else 1
                 begin, kind, length = i, this, 0
             length += 1
         for i in range(first, last + 1):
-            if _side(points, i) >= 0:
+            if side[i] >= 0:
                 weight[i] = 1.0
-                if run[i] == 1 and first < i < last:
+                if run[i] == 1 and first < i < last and side[i] < ELSEWHERE:
                     weight[i] = min(min(run[i - 1], run[i + 1]), _LONGEST_RUN) ** 2
     return weight
-
-
-@kernel
-def _side(points: Floats, i: int) -> int:
-    """0 for the middle of a horizontal side of a pixel, 1 for a vertical one, -1 for a corner."""
-    if points[i, 0] != np.floor(points[i, 0]):
-        return 0
-    return 1 if points[i, 1] != np.floor(points[i, 1]) else -1
 
 
 def pin_ends(points: Floats, curves: Curves, node: Floats) -> None:

@@ -32,7 +32,7 @@ def edge_sizes(
     is_corner: Flags,
     growth: float,
     edge_ratio: float,
-    shape: tuple[int, int],
+    shape: tuple[float, float],
 ) -> Floats:
     """Wanted length of final edges at each dense point.
 
@@ -48,7 +48,7 @@ def edge_sizes(
         Points where the curve may turn at once.
     growth, edge_ratio : float
         Largest ratio of neighbouring elements, and of neighbouring edges of a chain.
-    shape : tuple of int
+    shape : tuple of float
         (n_rows, n_cols) of the picture.
 
     Returns
@@ -65,12 +65,12 @@ def edge_sizes(
 
 
 def grade(
-    size: Floats, points: Floats, curves: Curves, growth: float, edge_ratio: float, shape: tuple[int, int]
+    size: Floats, points: Floats, curves: Curves, growth: float, edge_ratio: float, shape: tuple[float, float]
 ) -> Floats:
     """Limit how fast `size` grows away from fine places."""
     slope = 2.0 * (growth - 1.0) / (growth + 1.0)
     if size.min() < size.max():
-        raster = np.full(shape, np.inf, np.float32)
+        raster = np.full((int(np.ceil(shape[0])), int(np.ceil(shape[1]))), np.inf, np.float32)
         size = _grade_plane(size, points, slope, raster)
     return grade_chains(size, curves, int(curves.ends.max(initial=-1)) + 1, edge_ratio)
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from imgquad_core.arrays import Bytes, Floats, Ints, Labels
 from imgquad_core.errors import InputError
-from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, joined_pair, policy_code
+from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, corner_rule, joined_pair
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind
 
@@ -73,7 +73,8 @@ def extract_boundaries(image: LabelImage, options: ExtractionOptions | None = No
     labels = image.labels
     if labels.size == 0 or labels.max() < 0:
         raise InputError(f"picture of {labels.shape[0]} x {labels.shape[1]} pixels has none with a material to mesh")
-    code = _classify_corners(np.pad(labels, 1, constant_values=OUTSIDE), policy_code(options.policy))
+    rule = corner_rule(options.policy, options.step)
+    code = _classify_corners(np.pad(labels, 1, constant_values=OUTSIDE), rule)
     starts = np.flatnonzero(code[:-1, :-1] & _DOWN)
     rows = np.searchsorted(starts, np.arange(labels.shape[0] + 1) * labels.shape[1])
     run_region, first_run = _label_runs(code, labels, starts, rows)
@@ -122,7 +123,7 @@ def _kinds(points: Floats, n_nodes: int, shape: tuple[int, int]) -> Bytes:
 
 
 @kernel
-def _classify_corners(padded: Labels, policy: int) -> Bytes:
+def _classify_corners(padded: Labels, rule: int) -> Bytes:
     n, m = padded.shape[0] - 1, padded.shape[1] - 1
     code = np.zeros((n, m), np.uint8)
     for i in range(n):
@@ -136,7 +137,7 @@ def _classify_corners(padded: Labels, policy: int) -> Bytes:
             if n_sides == 3 or (n_sides == 2 and (i == 0 or i == n - 1) and (j == 0 or j == m - 1)):
                 bits += _MEETS
             elif n_sides == 4:
-                pair = joined_pair(padded, i + 1, j + 1, policy)
+                pair = joined_pair(padded, i + 1, j + 1, rule)
                 bits += _JOINS_AD if pair == PAIR_AD else (_JOINS_BC if pair == PAIR_BC else _MEETS)
             code[i, j] = bits
     return code

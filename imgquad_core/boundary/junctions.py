@@ -27,7 +27,7 @@ _BORDER_NOISE = 0.31  # px of residual up to which they are believed
 _JUNCTION = int(PointKind.JUNCTION)
 
 
-def place_junctions(curves: Curves, nodes: Ends, room: Floats, shape: tuple[int, int]) -> Floats:
+def place_junctions(curves: Curves, nodes: Ends, room: Floats, shape: tuple[float, float]) -> Floats:
     """Find better places for the junctions.
 
     Parameters
@@ -38,7 +38,7 @@ def place_junctions(curves: Curves, nodes: Ends, room: Floats, shape: tuple[int,
         The ends of its chains.
     room : float64, shape (n,)
         How far each dense point may move.
-    shape : tuple of int
+    shape : tuple of float
         (n_rows, n_cols) of the picture.
 
     Returns

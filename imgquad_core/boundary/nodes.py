@@ -21,7 +21,7 @@ from imgquad_core.chains import places_of
 from imgquad_core.geometry.conflicts import CROSSING, SHARP, find_conflicts
 from imgquad_core.jit import kernel, verb
 
-from .curves import Curves, Ends
+from .curves import Curves, Ends, numbered
 
 _LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
 _SHORT = 0.7  # the same beside a corner: a short piece there would keep both faces of a long chain from that
@@ -240,17 +240,8 @@ class Level(NamedTuple):
 
 def number_nodes(curves: Curves, n_ends: int, xy: Floats, placed: Placement) -> Nodes:
     """Give ids to placed nodes at `xy`."""
-    first, last = placed.offsets[:-1], placed.offsets[1:] - 1
-    closed = curves.ends[:, 0] < 0
-    is_inner = np.ones(len(xy), bool)
-    is_inner[first[~closed]] = False
-    is_inner[last] = False
-    n_inner = int(np.count_nonzero(is_inner))
-    ids = np.empty(len(xy), np.int64)
-    ids[is_inner] = n_ends + np.arange(n_inner)
-    ids[first[~closed]], ids[last[~closed]] = curves.ends[~closed].T
-    ids[last[closed]] = ids[first[closed]]
-    points = np.empty((n_ends + n_inner, 2))
+    ids = numbered(placed.offsets, curves.ends, n_ends)
+    points = np.empty((int(ids.max()) + 1, 2))
     points[ids] = xy
     return Nodes(points, ids, placed)
 
@@ -271,13 +262,13 @@ def level_of(nodes: Nodes, step: int) -> Level:
 
 
 def mark_conflicts(
-    points: Floats, level: Level, ends: Ends, is_new: Flags, gently: bool, shape: tuple[int, int]
+    points: Floats, level: Level, ends: Ends, is_new: Flags, gently: bool, shape: tuple[float, float], units: float
 ) -> Bytes:
     """Mark the segments of a level that cross or touch; `gently` also those too close or at too sharp sectors.
 
     Only pairs with a segment on a chain of `is_new` are tested for the former.
     """
-    marks = find_conflicts(points, level.segments, level.chain, is_new, shape)
+    marks = find_conflicts(points, level.segments, level.chain, is_new, shape, units)
     if gently:
         mark_sharp(points, level.chain_points, level.offsets, ends.offsets, ends.sockets, _LEAST_SECTOR, marks)
     else:

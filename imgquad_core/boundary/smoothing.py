@@ -9,20 +9,25 @@ their areas (`areas`).
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.geometry.conflicts import UNITS, snapped
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
 
-from .curves import Curves, curves_of, per_point, pin_ends
+from .averaging import averaged
+from .curves import Curves, PixelChains, curves_of, per_point, pin_ends, pixel_chains
 from .edge_sizes import edge_sizes
 from .feature_size import local_feature_size
 from .fitting import WINDOWS, fit_pieces
+from .joins import join_short_chains
 from .junctions import place_junctions
 from .nodes import Nodes
 from .options import SmoothingOptions
 from .sharp_corners import beside_corners, find_corners, place_corners
+from .stairs import Step, as_step, find_step, in_data_points
 from .true_shape import stretch
 from .withdrawal import Draft, place_freely, restore_areas_freely
 
@@ -50,33 +55,81 @@ def smooth_boundaries(
     Returns
     -------
     BoundaryGraph
-        The boundary that is meshed, with chains and regions numbered as in `graph`: an even number of edges for
-        every piece between corners, on every chain; all points, and the points at even places alone, form polylines
-        that neither cross nor touch. Coordinates are multiples of 2^-14 px.
+        The boundary that is meshed, with regions numbered as in `graph`, and the chains that are left in its order: an
+        even number of edges for every piece between corners, on every chain; all points, and the points at even places
+        alone, form polylines that neither cross nor touch. Coordinates are multiples of 2^-14 px.
     """
     options = options or SmoothingOptions()
-    curves, ends = curves_of(graph)
+    step = find_step(graph) if options.step == "auto" else as_step(options.step)
+    true = _TrueShape.of(graph.shape, shape, step)
+    chains = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step)
+    width = 0.5 * options.tolerance / true.unit
+    if width > 1.0:
+        chains = averaged(chains, width, UNITS * np.array(step))
+        true = _TrueShape.of(graph.shape, shape, (step[0] * width, step[1] * width))
+    curves, ends = curves_of(chains)
     curves, is_corner = find_corners(curves)
-    limit = per_point(curves, _asked_sizes(graph, options))
     room = _room(curves, is_corner, options.max_shift)
-    node = place_junctions(curves, ends, room, graph.shape)
+    node = place_junctions(curves, ends, room, chains.graph.shape)
     smooth = _smooth(curves, node, is_corner, room)
-    if shape is not None:
-        graph, curves, ends, node, smooth = stretch(graph, curves, ends, node, smooth, shape)
-    draft = Draft(curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.edge_multiple, graph.shape)
-    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, graph.shape)
+    if true.extent != chains.graph.shape:
+        curves, ends, node, smooth = stretch(curves, ends, node, smooth, chains.graph.shape, true.extent)
+    limit = per_point(curves, _asked_sizes(chains.graph, curves.is_frame, options) / true.unit)
+    draft = Draft(
+        curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.edge_multiple, true.extent, true.grid
+    )
+    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent)
     nodes, gently = place_freely(draft, size)
-    nodes = restore_areas_freely(graph, draft, nodes, room, options.max_shift, gently)
-    return _graph(graph, draft, nodes)
+    areas = graph.region_pixels * true.pixel
+    sides = np.array(chains.graph.chain_regions)
+    nodes = restore_areas_freely(sides, areas / true.unit**2, draft, nodes, room, options.max_shift, gently)
+    nodes = nodes._replace(points=snapped(nodes.points * true.unit))
+    pixels = np.maximum(np.rint(areas), 1).astype(np.int64)
+    return _graph(replace(chains.graph, shape=true.shape, region_pixels=pixels), draft, nodes)
 
 
-def _asked_sizes(graph: BoundaryGraph, options: SmoothingOptions) -> Floats:
+class _TrueShape(NamedTuple):
+    """Lengths in which curves are cut into edges."""
+
+    shape: tuple[int, int]  # (n_rows, n_cols) of the boundary that is made
+    unit: float  # its pixels a unit of length
+    extent: tuple[float, float]  # height and width in these units
+    pixel: float  # area of a pixel of the picture, in its pixels
+
+    @property
+    def grid(self) -> float:
+        """Steps of the grid on which coordinates are exact, a unit of length."""
+        return UNITS * self.unit
+
+    @staticmethod
+    def of(old: tuple[int, int], new: tuple[int, int] | None, step: Step) -> _TrueShape:
+        """Make the unit one data point, as if it were square."""
+        rows, cols = new or old
+        unit = float(np.sqrt(step[0] * step[1])) * min(rows / old[0], cols / old[1])
+        pixel = rows * cols / (old[0] * old[1])
+        return _TrueShape((rows, cols), unit, (rows / unit, cols / unit), pixel)
+
+
+def _joined(chains: PixelChains, options: SmoothingOptions, unit: float, step: Step) -> PixelChains:
+    """Join short chains, in data points."""
+    usual = max(2.0 * options.max_shift, options.tolerance / unit)
+    shortest = usual if options.join is None else options.join / unit
+    farthest = max(0.5 * shortest, options.max_shift)
+    return join_short_chains(chains, shortest, farthest, UNITS * np.array(step)).chains
+
+
+def _asked_sizes(graph: BoundaryGraph, is_frame: Flags, options: SmoothingOptions) -> Floats:
     """Asked length of final edges, for each chain."""
-    of_region = np.full(len(graph.region_label) + 1, float(options.boundary_size or options.size))
-    of_region[VOID] = np.inf
+    of_region = np.empty((2, len(graph.region_label) + 1))  # inside the picture, on its border
+    of_region[0], of_region[1] = options.boundary_size or options.size, options.frame_size or options.size
+    of_region[:, VOID] = np.inf
     for label, size in (options.material_sizes or {}).items():
-        of_region[:-1][graph.region_label == label] = size
-    return np.asarray(of_region[graph.chain_regions].min(axis=1))
+        of_region[:, :-1][:, graph.region_label == label] = size
+    asked = of_region[is_frame.astype(np.int64)[:, None], graph.chain_regions].min(axis=1)
+    beside = np.sort(np.append(graph.region_label, VOID)[graph.chain_regions], axis=1)
+    for pair, size in (options.sizes_between or {}).items():
+        asked[(beside == sorted(pair)).all(axis=1)] = size
+    return np.asarray(asked)
 
 
 def _room(curves: Curves, is_corner: Flags, max_shift: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Boundaries of pictures whose pixels are not square.
+"""Boundaries of pictures whose pixels, or data points, are not square.
 
 A pixel boundary is off by a share of a pixel each way: it is smoothed in pixels. Lengths of edges mean something in
 true shape only: it is stretched before it is cut into edges.
@@ -6,13 +6,11 @@ true shape only: it is stretched before it is cut into edges.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from imgquad_core.arrays import Floats
-from imgquad_core.model import BoundaryGraph
 
 from .curves import Curves, Ends, arc_lengths
 
@@ -46,20 +44,23 @@ def true_shape(shape: tuple[int, int], sides: tuple[float, float] = (1.0, 1.0)) 
 
 
 def stretch(
-    graph: BoundaryGraph, curves: Curves, ends: Ends, node: Floats, smooth: Floats, shape: tuple[int, int]
-) -> tuple[BoundaryGraph, Curves, Ends, Floats, Floats]:
-    """Stretch a picture of ``graph.shape`` to (height, width): its graph, curves, ends, moved ends, smooth curves."""
-    new, old = np.array(shape[::-1]), np.array(graph.shape[::-1])
+    curves: Curves,
+    ends: Ends,
+    node: Floats,
+    smooth: Floats,
+    old_shape: tuple[float, float],
+    new_shape: tuple[float, float],
+) -> tuple[Curves, Ends, Floats, Floats]:
+    """Stretch a picture to another (height, width): its curves, ends, moved ends, smooth curves."""
+    new, old = np.array(new_shape[::-1]), np.array(old_shape[::-1])
 
     def place(points: Floats) -> Floats:
         # first times, then by: what lies on the border lies on it exactly
         stretched: Floats = points * new / old
         return stretched
 
-    pixels = np.maximum(np.rint(graph.region_pixels * (new / old).prod()), 1).astype(np.int64)
     raw = place(curves.raw)
     return (
-        replace(graph, points=place(graph.points), region_pixels=pixels, shape=shape),
         curves._replace(raw=raw, arc=arc_lengths(raw, curves.offsets)),
         ends._replace(place=place(ends.place)),
         place(node),

@@ -14,8 +14,7 @@ import numpy as np
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.chains import places_of
 from imgquad_core.errors import TopologyError
-from imgquad_core.geometry.conflicts import SHARP, snapped
-from imgquad_core.model import BoundaryGraph
+from imgquad_core.geometry.conflicts import SHARP, UNITS, snapped
 
 from .areas import mitres, restore_areas
 from .curves import Curves, Ends, per_point, pin_ends
@@ -52,7 +51,8 @@ class Draft(NamedTuple):
     limit: Floats  #: (n,) asked length of final edges
     edge_ratio: float
     edge_multiple: int  #: very long pieces get a multiple of this many final edges
-    shape: tuple[int, int]
+    shape: tuple[float, float]
+    units: float = UNITS  #: steps of the grid on which coordinates are exact, a unit of length
 
 
 def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> tuple[Nodes, bool]:
@@ -83,7 +83,7 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         nodes = _place(draft, size, at_least, exact, withdrawn)
         factor, pull = np.ones(len(size)), np.zeros(len(size))
         for level in (level_of(nodes, 2), level_of(nodes, 1)):
-            marks = mark_conflicts(nodes.points, level, draft.ends, is_new, gently, draft.shape)
+            marks = mark_conflicts(nodes.points, level, draft.ends, is_new, gently, draft.shape, draft.units)
             _mark_dense(marks, level, curves.offsets, attempt >= patience.closer, factor, pull)
         if factor.min() == 1.0:
             return nodes, gently
@@ -114,7 +114,7 @@ def _place(draft: Draft, size: Floats, at_least: Ints, exact: Flags, withdrawn: 
     pin_ends(points, curves, _withdraw_ends(draft, withdrawn))
     placed = place_nodes(curves, size, draft.limit, draft.is_corner, at_least, exact, draft.edge_multiple)
     even_out(points, placed, exact, draft.edge_ratio)
-    return number_nodes(curves, len(draft.node), snapped(points_at(points, placed.at)), placed)
+    return number_nodes(curves, len(draft.node), snapped(points_at(points, placed.at), draft.units), placed)
 
 
 def _withdraw_ends(draft: Draft, withdrawn: Floats) -> Floats:
@@ -149,14 +149,16 @@ def _with_neighbours(ends: Ints, chains: Flags, n_nodes: int) -> Flags:
 
 
 def restore_areas_freely(
-    graph: BoundaryGraph, draft: Draft, nodes: Nodes, room: Floats, max_shift: float, gently: bool
+    sides: Ints, areas: Floats, draft: Draft, nodes: Nodes, room: Floats, max_shift: float, gently: bool
 ) -> Nodes:
     """Give regions their areas; less where that makes conflicts.
 
     Parameters
     ----------
-    graph : BoundaryGraph
-        The pixel boundary.
+    sides : int64, shape (n_chains, 2)
+        Region on the left and on the right of each chain.
+    areas : float64, shape (n_regions,)
+        Wanted areas.
     draft, nodes
         The curves, and their nodes without conflicts.
     room : float64, shape (n,)
@@ -168,18 +170,16 @@ def restore_areas_freely(
     """
     placed = nodes.placed
     bound = _area_bounds(draft.curves, nodes, room, max_shift)
-    shift, tested = np.zeros(graph.n_chains), nodes.points
-    had_conflicts = np.zeros(graph.n_chains, bool)
+    shift, tested = np.zeros(len(sides)), nodes.points
+    had_conflicts = np.zeros(len(sides), bool)
     for attempt in range(_AREA_ROUNDS):
-        points, shift = restore_areas(
-            nodes.points, nodes.chain_points, placed.offsets, graph.chain_regions, graph.region_pixels, bound, shift
-        )
-        points = snapped(points)
+        points, shift = restore_areas(nodes.points, nodes.chain_points, placed.offsets, sides, areas, bound, shift)
+        points = snapped(points, draft.units)
         has_moved = any_of_chain((points != tested).any(axis=1)[nodes.chain_points], placed.offsets)
         has_moved |= had_conflicts
         is_bad = np.zeros(len(points), bool)
         for level in (level_of(nodes, 2), level_of(nodes, 1)):
-            marks = mark_conflicts(points, level, draft.ends, has_moved, gently, draft.shape)
+            marks = mark_conflicts(points, level, draft.ends, has_moved, gently, draft.shape, draft.units)
             is_bad[level.segments[marks > 0]] = True
         if not is_bad.any():
             return nodes._replace(points=points)

@@ -17,12 +17,19 @@ FREE, SHARP, CLOSE, CROSSING = range(4)  #: what a segment is marked with
 _ROOM = 0.25  # least distance of a node from a segment that is not its own, over the length of that segment
 
 
-def snapped(points: Floats) -> Floats:
-    """Round coordinates to the grid on which the test is exact."""
-    return np.asarray(np.round(points * UNITS) / UNITS)
+def snapped(points: Floats, units: Floats | float = UNITS) -> Floats:
+    """Round coordinates to the grid on which the test is exact, of `units` steps each way."""
+    return np.asarray(np.round(points * units) / units)
 
 
-def find_conflicts(points: Floats, segments: Ints, chain: Ints, is_new: Flags, shape: tuple[int, int]) -> Bytes:
+def find_conflicts(
+    points: Floats,
+    segments: Ints,
+    chain: Ints,
+    is_new: Flags,
+    shape: tuple[float, float],
+    units: Floats | float = UNITS,
+) -> Bytes:
     """Find segments that cross, touch, coincide, have no length or come too close.
 
     Parameters
@@ -35,8 +42,10 @@ def find_conflicts(points: Floats, segments: Ints, chain: Ints, is_new: Flags, s
         Chain of each segment.
     is_new : bool, shape (n_chains,)
         Only pairs of which one is on a new chain are looked at.
-    shape : tuple of int
+    shape : tuple of float
         (n_rows, n_cols) of the picture.
+    units : float or float64, shape (2,)
+        Grid steps a unit of length, of x and y.
 
     Returns
     -------
@@ -50,7 +59,7 @@ def find_conflicts(points: Floats, segments: Ints, chain: Ints, is_new: Flags, s
         cell = max(float(lengths.mean()), float(np.sqrt(shape[0] * shape[1] / (4.0 * len(segments)))))
         n_across, n_up = int(shape[1] / cell) + 1, int(shape[0] / cell) + 1
         start, items = _bucket_segments(points, segments, cell, n_across, n_up)
-        grid = np.round(points * UNITS).astype(np.int64)
+        grid = np.round(points * units).astype(np.int64)
         _compare_in_cells(grid, points, segments, chain, is_new, start, items, marks)
         marks[(points[segments[:, 0]] == points[segments[:, 1]]).all(axis=1)] = CROSSING
     return marks

@@ -14,7 +14,8 @@ from .triangulators import TRIANGULATORS, triangulator_used
 if TYPE_CHECKING:
     from imgquad_core.arrays import Floats, Labels
 
-STEEPEST = 0.35  # slope of the size inside; above it the worst elements get bad (study: .55 gives SJ .03)
+#: steepest slope of the length of a coarse segment by growth; beyond it the worst elements cannot be mended
+STEEPEST = ((1.3, 1.6), (0.6, 1.0))
 
 
 class Effort(NamedTuple):
@@ -63,7 +64,7 @@ class MeshingOptions:
     size : float
         Length of final edges inside, in pixels.
     growth : float
-        Largest ratio of the sizes of neighbouring elements (above 1.35 it counts as 1.35 inside faces).
+        Largest ratio of the sizes of neighbouring elements (above 1.6 it counts as 1.6 inside faces).
     material_sizes : mapping of int to float
         Length of final edges per material label.
     effort : {"fast", "normal", "best"}
@@ -93,10 +94,11 @@ class MeshingOptions:
         check(self)
         triangulator_used(self.triangulator)
 
-    @property
-    def slope(self) -> float:
-        """Growth of the edge length per unit of length inside faces."""
-        return min(self.growth - 1.0, STEEPEST)
+    def slope(self, stride: int) -> float:
+        """Growth of the length of segments of `stride` final edges per unit of length inside faces."""
+        (gentle, steep), (least, most) = STEEPEST
+        share = min(max((self.growth - gentle) / (steep - gentle), 0.0), 1.0)
+        return min(stride * (self.growth - 1.0), least + share * (most - least))
 
     def face_sizes(self, labels: Labels) -> Floats:
         """Return the edge length asked for in each face."""

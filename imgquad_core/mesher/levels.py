@@ -30,7 +30,7 @@ from .splitting import split_composed
 from .triangulation import Triangles, constraint_table, triangulate
 
 LEAST_WIDTH = 3.0  # of a face that is meshed on stride 4, in its coarse segments
-EVEN = 0.8  # of the size inside, mean edge around a face at stride 6: its size hardly grows from the rim inwards
+EVEN = {4: 0.7, 6: 0.8}  # of the size inside, mean edge around a face at a stride: within it the size hardly grows
 ENOUGH = 0.65  # worst element from which a face is not tried with a smaller stride
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, at least; groups at most
@@ -80,11 +80,11 @@ def mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> Me
     """Mesh flagged faces, each on its stride."""
     effort = EFFORTS[options.effort]
     best = Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -np.inf))
+    rim = mean_edges(graph) / options.face_sizes(graph.region_label)
     if effort.in_nine:
-        even = mean_edges(graph) > EVEN * options.face_sizes(graph.region_label)
-        very_wide = todo & wide_faces(graph, 6, options.tuning.very_wide) & even
-        best = _better(best, _mesh_wide(graph, very_wide, 6, effort.wide, options))
-    wide = todo & wide_faces(graph, 4, LEAST_WIDTH) & (best.worst < ENOUGH)
+        wide = todo & wide_faces(graph, 6, options.tuning.very_wide) & (rim > EVEN[6])
+        best = _better(best, _mesh_wide(graph, wide, 6, effort.wide, options))
+    wide = todo & wide_faces(graph, 4, LEAST_WIDTH) & (rim >= EVEN[4]) & (best.worst < ENOUGH)
     best = _better(best, _mesh_wide(graph, wide, 4, effort.wide, options))
     enough = np.where(_large_faces(best), min(options.tuning.worst, effort.again_below), effort.again_below)
     return _better(best, _mesh_level(graph, todo & (best.worst < enough), 2, effort.narrow, options))
@@ -147,7 +147,7 @@ def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOp
     flat = outline(graph, faces, stride)
     largest = BACKGROUND_AREA * float(sizes[faces].max()) ** 2
     cut = _cut(triangulate(flat.points, flat.segments, largest, options.triangulator), flat)
-    field = cross_field(cut, _largest_sizes(cut, sizes), options.slope)
+    field = cross_field(cut, _largest_sizes(cut, sizes), options.slope(stride))
     points = np.vstack([flat.points, frontal_points(cut, field)])
     cut = _cut(triangulate(points, flat.segments, triangulator=options.triangulator), flat)
     quads = split_composed(cut, compose(cut), len(flat.ids))

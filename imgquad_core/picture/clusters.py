@@ -20,15 +20,15 @@ class Clusters(NamedTuple):
     last: Labels  #: last pixel of this list, valid at roots
 
 
-def labelled_clusters(colors: Labels, policy: int) -> Clusters:
+def labelled_clusters(colors: Labels, rule: int) -> Clusters:
     """Label the clusters of a picture of colours, int32 (n_rows, n_cols); equal colours need not be one cluster.
 
-    `policy` says what is connected over a corner: a place in `imgquad_core.geometry.corner_rule.POLICIES`.
+    `rule` says what is connected over a corner, see `imgquad_core.geometry.corner_rule`.
     """
     n = colors.size
     pixels = np.arange(n, dtype=np.int32)
     clusters = Clusters(pixels, np.ones(n, np.int32), np.full(n, -1, np.int32), pixels.copy())
-    label_clusters(colors, clusters, policy)
+    label_clusters(colors, clusters, rule)
     return clusters
 
 
@@ -57,7 +57,7 @@ def join(clusters: Clusters, p: int, q: int) -> int:
 
 
 @kernel
-def label_clusters(colors: Labels, clusters: Clusters, policy: int) -> None:
+def label_clusters(colors: Labels, clusters: Clusters, rule: int) -> None:
     """Unite the pixels of each cluster."""
     rows, cols = colors.shape
     for r in range(rows):
@@ -68,7 +68,7 @@ def label_clusters(colors: Labels, clusters: Clusters, policy: int) -> None:
             if r > 0 and colors[r, c] == colors[r - 1, c]:
                 join(clusters, p - cols, p)
             if r > 0 and c > 0:
-                pair = joined_pair(colors, r, c, policy)
+                pair = joined_pair(colors, r, c, rule)
                 if pair == PAIR_AD:
                     join(clusters, p - cols - 1, p)
                 elif pair == PAIR_BC:

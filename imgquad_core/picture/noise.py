@@ -13,7 +13,7 @@ import numpy as np
 
 from imgquad_core.arrays import Ints, Labels
 from imgquad_core.errors import InputError
-from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, joined_pair, policy_code
+from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, corner_rule, joined_pair
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage
 
@@ -108,14 +108,16 @@ def remove_noise(image: LabelImage, options: DenoiseOptions | None = None) -> La
     return LabelImage(_unranked(values, colors), image.materials)
 
 
-def list_removed(before: LabelImage, after: LabelImage, policy: str = "minority") -> tuple[Removal, ...]:
+def list_removed(
+    before: LabelImage, after: LabelImage, policy: str = "minority", step: float = 1.0
+) -> tuple[Removal, ...]:
     """List by material what noise removal took away.
 
     Parameters
     ----------
     before, after : LabelImage
         What `remove_noise` took and gave.
-    policy : str
+    policy, step
         As in the options of the removal.
 
     Returns
@@ -128,7 +130,7 @@ def list_removed(before: LabelImage, after: LabelImage, policy: str = "minority"
     if before.labels is after.labels:
         return ()
     changed = (before.labels != after.labels).ravel()
-    root = labelled_clusters(_ranked(before.labels)[1], policy_code(policy)).parent
+    root = labelled_clusters(_ranked(before.labels)[1], corner_rule(policy, step)).parent
     while (root != root[root]).any():
         root = root[root]
     lost = before.labels.ravel()[changed]
@@ -183,8 +185,8 @@ def _unranked(values: Labels, colors: Labels) -> Labels:
 
 def _remove_once(colors: Labels, n_colors: int, options: DenoiseOptions) -> int:
     """Recolour noise in place; return the number of clusters that went."""
-    min_pixels, policy = min(int(options.min_pixels), colors.size + 1), policy_code(options.policy)
-    clusters = labelled_clusters(colors, policy)
+    min_pixels, rule = min(int(options.min_pixels), colors.size + 1), corner_rule(options.policy, options.step)
+    clusters = labelled_clusters(colors, rule)
     queue = _queued(colors, clusters, min_pixels)
     scratch = Scratch(
         np.zeros(colors.size, np.int32),
@@ -201,7 +203,7 @@ def _remove_once(colors: Labels, n_colors: int, options: DenoiseOptions) -> int:
             n = merged_roots(clusters, queue, size, merged)
             roots = np.unique(np.concatenate([roots, merged[:n]]))
         if len(roots):
-            gone += absorb_noise(colors, clusters, queue, scratch, roots, size, options.min_length, policy)
+            gone += absorb_noise(colors, clusters, queue, scratch, roots, size, options.min_length, rule)
     return gone
 
 
@@ -222,7 +224,7 @@ def absorb_noise(
     roots: Labels,
     size: int,
     min_length: float,
-    policy: int,
+    rule: int,
 ) -> int:
     """Recolour the noise among clusters of `size` pixels; return how many went."""
     gone = 0
@@ -233,7 +235,7 @@ def absorb_noise(
         color = neighbour_color(colors, clusters, scratch, root)
         if color == VOID or characteristic_length(colors, clusters, scratch, root) >= min_length:
             continue
-        give_away(colors, clusters, queue, root, color, policy)
+        give_away(colors, clusters, queue, root, color, rule)
         gone += 1
     return gone
 
@@ -344,7 +346,7 @@ def forget_distances(clusters: Clusters, scratch: Scratch, root: int) -> None:
 
 
 @verb
-def give_away(colors: Labels, clusters: Clusters, queue: Queue, root: int, color: int, policy: int) -> None:
+def give_away(colors: Labels, clusters: Clusters, queue: Queue, root: int, color: int, rule: int) -> None:
     """Recolour a cluster and unite it, and what it kept apart, with what it now touches."""
     rows, cols = colors.shape
     flat = colors.ravel()
@@ -363,15 +365,15 @@ def give_away(colors: Labels, clusters: Clusters, queue: Queue, root: int, color
         for i in range(p // cols, p // cols + 2):
             for j in range(p % cols, p % cols + 2):
                 if 0 < i < rows and 0 < j < cols:
-                    merge_diagonal(colors, clusters, queue, i, j, policy)
+                    merge_diagonal(colors, clusters, queue, i, j, rule)
         p = following
 
 
 @verb
-def merge_diagonal(colors: Labels, clusters: Clusters, queue: Queue, i: int, j: int, policy: int) -> None:
+def merge_diagonal(colors: Labels, clusters: Clusters, queue: Queue, i: int, j: int, rule: int) -> None:
     """Unite the pixels that are connected over one corner."""
     p = i * colors.shape[1] + j
-    pair = joined_pair(colors, i, j, policy)
+    pair = joined_pair(colors, i, j, rule)
     if pair == PAIR_AD and colors[i, j] != VOID:
         merge(clusters, queue, p - colors.shape[1] - 1, p)
     elif pair == PAIR_BC and colors[i - 1, j] != VOID:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import sqrt
 from numbers import Integral
 from typing import Any
 
@@ -188,6 +189,8 @@ class DenoiseOptions:
         Clusters of this characteristic length or more stay, in pixels. 0: nothing is removed.
     policy : {"minority", "majority", "lower", "diagonal", "junction"}
         What is connected over an ambiguous corner of four pixels: the same as in `ExtractionOptions`.
+    step : float
+        Width of the picture's data points in pixels, for that.
     """
 
     min_pixels: int = option(
@@ -207,11 +210,59 @@ class DenoiseOptions:
         topic="noise",
     )
     policy: str = POLICY.field()
+    step: float = field(default=1.0, metadata={"internal": True})  # seen in the picture: no filter has it
 
     def __post_init__(self) -> None:
         check(self)
+
+    def scaled(self, step: tuple[float, float]) -> DenoiseOptions:
+        """Return the same limits in pixels where they count data points of that width and height."""
+        area = step[0] * step[1]
+        return replace(
+            self,
+            min_pixels=round(self.min_pixels * area),
+            min_length=self.min_length * sqrt(area),
+            step=0.5 * sum(step),
+        )
 
     @property
     def removes(self) -> bool:
         """Whether any cluster can be noise: a single pixel has the length 1."""
         return self.min_pixels > 1 and self.min_length > 1
+
+
+@dataclass(frozen=True)
+class AbsorbOptions:
+    """What is absorbed.
+
+    Parameters
+    ----------
+    tolerance : float
+        Parts of a region that are thinner, and regions below its square, go to their neighbours; in pixels.
+    keep : sequence of int
+        Materials whose pixels are never given away.
+    policy : str
+        What is connected over an ambiguous corner of four pixels: the same as in `ExtractionOptions`.
+    step : float
+        Width of the picture's data points in pixels, for that.
+    """
+
+    tolerance: float = option(
+        0.0,
+        "parts of the picture that are thinner go to their neighbours, boundaries shorter than it are joined, and "
+        "outlines smoothed over half of it, in pixels; 0: the picture is taken at its word",
+        what="a length",
+        least=0.0,
+        unit="px",
+        topic="boundaries",
+    )
+    keep: tuple[int, ...] = option(
+        (), "materials that the tolerance takes nothing from, by name or number", topic="boundaries"
+    )
+    policy: str = POLICY.field()
+    step: float = field(default=1.0, metadata={"internal": True})  # seen in the picture: no filter has it
+
+    def __post_init__(self) -> None:
+        check(self)
+        if 0.0 < self.tolerance < 1.0:
+            raise InputError(f"tolerance is {self.tolerance:g}; give 0, or a length of at least 1 px")

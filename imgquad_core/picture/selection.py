@@ -36,6 +36,14 @@ def sizes_by_number(materials: Materials, sizes: Mapping[Any, float]) -> dict[in
     return {material_number(materials, name): size for name, size in sizes.items()}
 
 
+def sizes_by_numbers(materials: Materials, sizes: Mapping[Any, float]) -> dict[tuple[int, int], float]:
+    """Return sizes between two materials, given by names or numbers, by numbers."""
+    return {
+        (material_number(materials, one), material_number(materials, other)): size
+        for (one, other), size in sizes.items()
+    }
+
+
 def crop_image(image: LabelImage, box: Box) -> LabelImage:
     """Return the part of a picture within a box.
 

@@ -55,6 +55,14 @@ def _write_sizes(sizes: Mapping[Any, float] | None) -> str:
     return _joined(f"{name}={size!r}" for name, size in (sizes or {}).items())
 
 
+def _sizes_between(text: str) -> dict[tuple[str, str], float]:
+    return dict(size_between(item) for item in _items(text))
+
+
+def _write_sizes_between(sizes: Mapping[Any, float] | None) -> str:
+    return _joined(f"{_joined(map(str, pair))}={size!r}" for pair, size in (sizes or {}).items())
+
+
 def _cohesive(text: str) -> str | tuple[tuple[str, str], ...] | None:
     return _gathered_pairs([pair(item) for item in _items(text)])
 
@@ -120,6 +128,20 @@ def size_of(text: str) -> tuple[str, float]:
     return material, number(size)
 
 
+def size_between(text: str) -> tuple[tuple[str, str], float]:
+    """Return what --size-between asks for."""
+    materials, _, size = text.rpartition("=")
+    pair = _items(materials)
+    if len(pair) != 2:
+        raise argparse.ArgumentTypeError(f"'{text}' is not A,B=S, as in quartz,feldspar=2")
+    return (pair[0], pair[1]), number(size)
+
+
+def step(text: str) -> str | float | tuple[float, float]:
+    """Return what --step asks for."""
+    return text if text == "auto" else sides(text)
+
+
 def whole_or_auto(text: str) -> int | str:
     """Return 'auto' or a whole number."""
     return text if text == "auto" else whole(text)
@@ -173,6 +195,28 @@ TEXTS: Mapping[str, Text] = {
     "min_pixels": Text(whole_or_auto, str, "auto|N"),
     "min_length": Text(real_or_auto, lambda v: v if isinstance(v, str) else repr(v), "auto|LENGTH"),
     "boundary_size": Text(_none_or(number, "auto"), _write_or(repr, "auto"), "LENGTH", "auto: as inside."),
+    "frame_size": Text(_none_or(number, "auto"), _write_or(repr, "auto"), "LENGTH", "auto: as inside."),
+    "join": Text(
+        _none_or(number, "auto"), _write_or(repr, "auto"), "LENGTH", "auto: two data points, or the tolerance."
+    ),
+    "step": Text(step, lambda v: v if isinstance(v, str) else _write_numbers(v), "auto|K|KX,KY", "Written 4, or 3,2."),
+    "sizes_between": Text(
+        _sizes_between,
+        _write_sizes_between,
+        "A,B=LENGTH",
+        'Each in double quotes: "quartz,feldspar=2","1,7=1".',
+        "size-between",
+        size_between,
+        dict,
+    ),
+    "keep": Text(
+        lambda text: tuple(_items(text)),
+        lambda names: _joined(map(str, names)),
+        "MATERIAL",
+        f"Separated by commas; {_QUOTED}.",
+        "keep",
+        str,
+    ),
     "material_sizes": Text(
         _sizes,
         _write_sizes,

@@ -28,6 +28,8 @@ Colors: TypeAlias = "Literal['auto', 'exact', 'regions'] | int | Sequence[Sequen
 Flatten: TypeAlias = Literal["auto", "off"]
 Marks: TypeAlias = "str | Path | ArrayLike | None"
 MaterialSizes: TypeAlias = "Mapping[str | int, float] | None"
+SizesBetween: TypeAlias = "Mapping[tuple[str | int, str | int], float] | None"
+Step: TypeAlias = "Literal['auto'] | float | tuple[float, float]"
 
 
 def segment(
@@ -213,7 +215,9 @@ def mesh(
     *,
     size: float = 4.0,
     boundary_size: float | None = None,
+    frame_size: float | None = None,
     material_sizes: MaterialSizes = None,
+    sizes_between: SizesBetween = None,
     growth: float = 1.3,
     colors: Colors = "auto",
     flatten: Flatten = "auto",
@@ -225,6 +229,10 @@ def mesh(
     policy: Policy = "minority",
     edge_ratio: float = 1.2,
     max_shift: float = 1.0,
+    step: Step = "auto",
+    tolerance: float = 0.0,
+    keep: Sequence[str | int] = (),
+    join: float | None = None,
     drop: Sequence[str | int] = (),
     drop_transparent: bool = False,
     periodic: Periodic = "none",
@@ -247,9 +255,13 @@ def mesh(
     size : float, default: 4.0
         Length of the final edges.
     boundary_size : float, optional
-        The same on boundaries.
+        The same on boundaries inside the picture.
+    frame_size : float, optional
+        The same on the picture's border.
     material_sizes : mapping, optional
         The same in single materials, by name or number.
+    sizes_between : mapping, optional
+        The same on boundaries between two materials, by pairs of names or numbers.
     growth : float, default: 1.3
         Largest ratio of the sizes of neighbouring elements.
     colors : "auto" | "exact" | "regions" | int | sequence, default: "auto"
@@ -269,7 +281,18 @@ def mesh(
     edge_ratio : float, default: 1.2
         Largest ratio of the lengths of neighbouring edges on a boundary.
     max_shift : float, default: 1.0
-        How far smoothing moves a boundary at most, always in pixels.
+        How far smoothing moves a boundary at most, always in data points.
+    step : "auto" | float | (float, float), default: "auto"
+        Width (and height) of the picture's data points, always in pixels: their stairs are smoothed as those of pixels
+        are, and limits of noise count them. "auto" sees it.
+    tolerance : float, default: 0.0
+        Parts of the image that are thinner go to their neighbours, boundaries shorter than this between two junctions
+        are joined, and outlines smoothed over half of it.
+    keep : sequence, optional
+        Materials that `tolerance` takes nothing from, by name or number.
+    join : float, optional
+        Boundaries shorter than this between two junctions are joined, where sectors around stay wide. Defaults to two
+        data points, or the tolerance; 0 for none.
     drop : sequence, optional
         Materials that are left out, by name or number.
     drop_transparent : bool, default: False
@@ -307,8 +330,8 @@ def mesh(
     Warns
     -----
     UserWarning
-        Thin features force many times more quads than the area over the square of the size, or it is doubtful what
-        the materials are.
+        Thin features force many times more quads than the area over the square of the size, a material loses half or
+        more of its area to `tolerance`, or it is doubtful what the materials are.
 
     Examples
     --------
@@ -320,8 +343,10 @@ def mesh(
     >>> mesh.bounds[:4]
     (-0.5, 59.5, -0.5, 39.5)
     """
-    sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
-    values = checked(growth=growth, policy=policy, edge_ratio=edge_ratio, max_shift=max_shift, effort=effort)
+    sizes = checked(size=size, boundary_size=boundary_size, frame_size=frame_size, material_sizes=material_sizes)
+    sizes |= checked(sizes_between=sizes_between, tolerance=tolerance, join=join)
+    values = checked(step=step, keep=keep)
+    values |= checked(growth=growth, policy=policy, edge_ratio=edge_ratio, max_shift=max_shift, effort=effort)
     values |= checked(threads=threads, triangulator=triangulator, periodic=periodic)
     values |= checked(min_pixels=min_pixels, min_length=min_length, drop=drop)
     early = checked(colors=colors, flatten=flatten, learn=learn, fill_void=fill_void)
@@ -336,7 +361,7 @@ def mesh(
         found = images.segmented(image, scalars, core.picture.SegmentationOptions(**early))
         done = core.pipeline.run(found, options, lambda stage, *_: begin(stage))
     many = core.pipeline.thin_features(done.labels, done.pixel_mesh, options)
-    _warn((*found.warnings, many) if many else found.warnings)
+    _warn((*found.warnings, *core.pipeline.lost_materials(done), *([many] if many else [])))
     grid = grids.to_grid(done.pixel_mesh, placement.divided(done.labels.shape, done.boundary.shape))
     _sample(grid, done.pixel_mesh, columns, done.boundary.shape)
     return grid

@@ -13,7 +13,7 @@ from imgquad_mesh.datasets.lines import from_lines, to_lines
 from imgquad_mesh.progress import progress_of
 
 from .grids import Effort
-from .images import MaterialSizes, Periodic, Triangulator, Unit, in_pixels
+from .images import MaterialSizes, Periodic, SizesBetween, Step, Triangulator, Unit, in_pixels
 from .parameters import checked
 
 
@@ -22,10 +22,15 @@ def smooth(
     size: float = 4.0,
     *,
     boundary_size: float | None = None,
+    frame_size: float | None = None,
     material_sizes: MaterialSizes = None,
+    sizes_between: SizesBetween = None,
     growth: float = 1.3,
     edge_ratio: float = 1.2,
     max_shift: float = 1.0,
+    step: Step = "auto",
+    tolerance: float = 0.0,
+    join: float | None = None,
     edge_multiple: Literal[4, 12] = 4,
     periodic: Periodic = "none",
     unit: Unit = "pixels",
@@ -42,15 +47,27 @@ def smooth(
     size : float, default: 4.0
         Length of the final edges.
     boundary_size : float, optional
-        The same on boundaries.
+        The same on boundaries inside the picture.
+    frame_size : float, optional
+        The same on the picture's border.
     material_sizes : mapping, optional
         The same in single materials, by name or number.
+    sizes_between : mapping, optional
+        The same on boundaries between two materials, by pairs of names or numbers.
     growth : float, default: 1.3
         Largest ratio of the sizes of neighbouring elements.
     edge_ratio : float, default: 1.2
         Largest ratio of the lengths of neighbouring edges on a boundary.
     max_shift : float, default: 1.0
-        How far a boundary moves at most, always in pixels.
+        How far a boundary moves at most, always in data points.
+    step : "auto" | float | (float, float), default: "auto"
+        Width (and height) of the picture's data points, always in pixels: their stairs are smoothed as those of pixels
+        are, and limits of noise count them. "auto" sees it.
+    tolerance : float, default: 0.0
+        Outlines are smoothed over half of it, and boundaries shorter than it joined; `mesh` absorbs thin parts, too.
+    join : float, optional
+        Boundaries shorter than this between two junctions are joined, where sectors around stay wide. Defaults to two
+        data points, or the tolerance; 0 for none.
     edge_multiple : 4 | 12, default: 4
         Very long boundaries get a multiple of this many edges, up to 10 % off the size: with 12 and effort "best" the
         quads of very wide regions are then split in nine.
@@ -66,14 +83,16 @@ def smooth(
     pyvista.PolyData
         The boundaries that are meshed, with the same arrays.
     """
-    values = checked(growth=growth, edge_ratio=edge_ratio, max_shift=max_shift, edge_multiple=edge_multiple)
-    sizes = checked(size=size, boundary_size=boundary_size, material_sizes=material_sizes)
+    values = checked(growth=growth, edge_ratio=edge_ratio, max_shift=max_shift, edge_multiple=edge_multiple, step=step)
+    sizes = checked(size=size, boundary_size=boundary_size, frame_size=frame_size, material_sizes=material_sizes)
+    sizes |= checked(sizes_between=sizes_between, tolerance=tolerance, join=join)
     repeat = checked(periodic=periodic)["periodic"]
     given = from_lines(lines)
     if given.sizes is not None:
         raise InputError("these boundaries are smooth already: smooth those that image.imgquad.boundaries() gave")
     sizes = in_pixels(sizes, unit, given.placement.pixel_size)
     sizes["material_sizes"] = core.picture.sizes_by_number(given.materials, sizes["material_sizes"])
+    sizes["sizes_between"] = core.picture.sizes_by_numbers(given.materials, sizes["sizes_between"])
     options = core.boundary.SmoothingOptions(**sizes, **values)
     with progress_of(progress_bar) as begin:
         begin("smooth")

@@ -114,6 +114,33 @@ def _sizes(value: Any, name: str) -> dict[str | int, float]:
     return {_material(key, name): _length(size, f"{name}[{key!r}]") for key, size in value.items()}
 
 
+def _sizes_between(value: Any, name: str) -> dict[tuple[str | int, str | int], float]:
+    if value is None:
+        return {}
+    _validation.check_instance(value, Mapping, name=name)
+    return {_pair(key, name): _length(size, f"{name}[{key!r}]") for key, size in value.items()}
+
+
+def _pair(value: Any, name: str) -> tuple[str | int, str | int]:
+    _validation.check_instance(value, tuple, name=f"{name}: two materials")
+    _validation.check_length(value, exact_length=2, name=f"{name}: two materials")
+    return _material(value[0], name), _material(value[1], name)
+
+
+def _step(value: Any, name: str) -> Any:
+    if isinstance(value, str):
+        return choice(value, name, ["auto"])
+    sides = list(value) if isinstance(value, (tuple, list)) else [value, value]
+    _validation.check_length(sides, exact_length=2, name=name)
+    return tuple(_number(side, name, limits=(1.0, 1000.0)) for side in sides)
+
+
+def _length_or_nothing(value: Any, name: str) -> float:
+    length = float(_number(value, name))
+    _validation.check_nonnegative(length, name=name)
+    return length
+
+
 def _materials(value: Any, name: str) -> tuple[str | int, ...]:
     return tuple(_material(each, name) for each in _several(value, name))
 
@@ -139,7 +166,13 @@ def _material(value: Any, name: str) -> str | int:
 _OWN: Mapping[str, Callable[[Any, str], Any]] = {
     "size": _length,
     "boundary_size": _length_or_none,
+    "frame_size": _length_or_none,
     "material_sizes": _sizes,
+    "sizes_between": _sizes_between,
+    "step": _step,
+    "tolerance": _length_or_nothing,
+    "join": lambda value, name: None if value is None else _length_or_nothing(value, name),
+    "keep": _materials,
     "colors": _colors,
     "marks": _marks,
     "min_pixels": _limit_of_noise,

@@ -35,6 +35,7 @@ from imgquad_core.picture import (
     list_removed,
     remove_noise,
     sizes_by_number,
+    sizes_by_numbers,
 )
 from imgquad_mesh.outputs.files import check_target, mesh_extensions, write_labels, write_mesh_file
 
@@ -162,7 +163,9 @@ def _extract(state: State, options: ExtractionOptions) -> dict[str, Any]:
 
 
 def _smooth(state: State, options: SmoothingOptions) -> dict[str, Any]:
-    state.boundary = pipeline.smooth(_pixel_boundary(state), _numbered(options, state))
+    between = sizes_by_numbers(_labels(state).materials, options.sizes_between or {})
+    numbered = replace(_numbered(options, state), sizes_between=between or None)
+    state.boundary = pipeline.smooth(_pixel_boundary(state), numbered)
     return _put_boundary(state, state.boundary, "smoothed boundary")
 
 

@@ -11,18 +11,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.measures.quality import bad_places, forced_quads, quality_report, scaled_jacobian
 from imgquad_core.mesher import triangulator_used
 from imgquad_core.model import BoundaryGraph, PointKind
-from imgquad_core.pipeline import thin_features
+from imgquad_core.pipeline import lost_materials, thin_features
 
 if TYPE_CHECKING:
     from imgquad_core.pipeline import Run
 
 PACKAGES = ("imgquad-mesh", "numpy", "scipy", "numba", "scikit-image", "triangle", "pythoncdt", "pyvista", "vtk")
+MOST_MATERIALS = 10  #: that lost regions are named
 LOW = 0.3  #: scaled Jacobian below which Verdict calls a quad bad; counted in every report
 
 
@@ -42,6 +44,7 @@ def build_report(
         "notes": list(notes(run)),
         "warnings": list(run.segmentation.warnings),
         "materials": [asdict(row) for row in ledger],
+        "absorbed": [asdict(absorption) for absorption in run.absorbed],
         "removed": [asdict(removal) for removal in run.removed],
         "counts": _counts(run),
         "region_errors": asdict(region_errors(run.boundary)),
@@ -60,9 +63,36 @@ def notes(run: Run) -> Iterator[str]:
         limits = f"clusters below {run.noise.min_pixels} pixels and shorter than {run.noise.min_length:g} px"
         removed = sum(removal.clusters for removal in run.removed)
         yield f"noise: {removed} {limits} removed, {sum(removal.pixels for removal in run.removed)} pixels"
+    yield from _of_tolerance(run)
     many = thin_features(run.labels, run.mesh, run.options)
     if many:
         yield many
+
+
+def _of_tolerance(run: Run) -> Iterator[str]:
+    """Say what was done about stairs and thin parts, and what that cost."""
+    if run.step != (1.0, 1.0) and run.options.step == "auto":
+        yield f"data points of {run.step[0]:g} x {run.step[1]:g} pixels (--step 1 keeps the stairs)"
+    if not run.absorbed:
+        return
+    rows = [row for row in run.absorbed if row.absorbed]
+    gone, regions = sum(row.absorbed for row in rows), sum(row.regions for row in run.absorbed)
+    share = sum(row.lost for row in run.absorbed) / sum(row.pixels for row in run.absorbed)
+    joined = run.pixel_boundary.n_chains - run.boundary.n_chains
+    yield (
+        f"tolerance {run.options.tolerance:g} px: {gone} of {regions} regions absorbed, {share:.2%} of the area moved, "
+        f"{joined} boundaries joined, boundaries moved up to {_moved(run):.1f} px"
+    )
+    for row in sorted(rows, key=lambda row: -row.absorbed)[:MOST_MATERIALS]:
+        yield f"material {run.clean.materials.name_of(row.material)}: {row.absorbed} of {row.regions} regions absorbed"
+    yield from lost_materials(run)
+
+
+def _moved(run: Run) -> float:
+    """Return the largest distance of a boundary from those of the picture without noise, in pixels."""
+    before, after = extract_boundaries(run.clean), run.boundary
+    to_pixels = np.array(run.clean.shape[::-1]) / np.array(after.shape[::-1])
+    return float(cKDTree(before.points).query(after.points * to_pixels)[0].max())
 
 
 def versions() -> dict[str, str]:
@@ -102,7 +132,8 @@ def _options(run: Run) -> dict[str, Any]:
     }
     sizes = {str(name): size for name, size in run.options.material_sizes.items()}
     marks = None if run.options.marks is None else str(run.options.marks)
-    return values | used | {"material_sizes": sizes, "marks": marks}
+    between = {",".join(map(str, pair)): size for pair, size in run.options.sizes_between.items()}
+    return values | used | {"material_sizes": sizes, "sizes_between": between, "step": list(run.step), "marks": marks}
 
 
 def _counts(run: Run) -> dict[str, dict[str, int]]:

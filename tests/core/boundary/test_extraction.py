@@ -9,7 +9,7 @@ from scipy import ndimage
 from imgquad_core.boundary.areas import enclosed_areas
 from imgquad_core.boundary.extraction import ExtractionOptions, extract_boundaries
 from imgquad_core.errors import InputError
-from imgquad_core.geometry.corner_rule import POLICIES, policy_code
+from imgquad_core.geometry.corner_rule import POLICIES, corner_rule
 from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.picture.clusters import labelled_clusters
 from support.labels import any_labels, label_image, spiral
@@ -124,7 +124,7 @@ def test_an_unknown_policy_is_refused() -> None:
 def test_clusters_of_noise_removal_are_the_regions(policy: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     labels = rng.integers(0, 2 + seed % 3, rng.integers(1, 25, 2)).astype(np.int32)
-    parent = labelled_clusters(labels, policy_code(policy)).parent
+    parent = labelled_clusters(labels, corner_rule(policy)).parent
     while (parent != parent[parent]).any():
         parent = parent[parent]
     pixels = np.unique(parent, return_counts=True)[1]  # roots are first pixels, so in the order of regions

@@ -1,0 +1,293 @@
+"""Stairs of several pixels: pictures that were enlarged, maps whose data points are wider than a pixel.
+
+A pixel boundary is smoothed as if every pixel were one observation. Where data points are k pixels wide its stairs are
+k times as coarse, and nothing that is counted in pixels fits. So the width of data points is seen, and the chains are
+drawn anew in data points: what comes after works in these, and its result is multiplied by k at the end::
+
+          +-------            k = 4:  a run of 8 px becomes two sides,  o--|--o
+          |                           one of 4 px one side,             o
+      +---+                           a bend stays a bend
+
+The width is seen twice: in the spectrum of the places of sides (periodic layouts have one, too) and in stairs: runs
+between a left and a right bend, several in a row. Hexagons, drawn in pixels, have no stairs of their width: their rows
+and columns are sqrt(3) to 1 apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.jit import kernel
+from imgquad_core.model import BoundaryGraph, PointKind
+
+from .curves import ACROSS, PIXEL_CORNER, PixelChains, numbered, pixel_chains
+
+_FEWEST_SIDES = 30  # across an axis, for a spectrum
+_LONGEST = 24.0  # px, of the periods that are looked for; the shortest is 2: places are whole numbers
+_FINENESS = 10  # frequencies a period of the whole span
+_BESIDE = 8  # frequencies to each side that a peak is higher than
+_PEAK, _OF_HIGHEST = 0.3, 0.8  # least height of a peak, alone and over the highest one
+_FEWEST_STEPS, _IN_A_ROW = 8, 3
+_ALIKE, _LEAST_MEAN = 0.6, 1.25  # share of the steps of the width, and its least mean, px
+_SHORT, _FEW_SHORT = 0.6, 0.02  # of the width; share of runs below it, at most
+_CLEAR, _OFF = 0.6, 1.0  # least height of the peak, and its distance in px from the mean step
+_HEX_LEAST, _HEX_OFF, _HEX_CLEAR = 2.0, 0.03, 0.2  # least distance of rows, px; off sqrt(3) at most; height there
+_WHOLE = 0.004  # a period this near a whole number, relative, is that number
+
+#: width and height of data points, in pixels
+Step: TypeAlias = "tuple[float, float]"
+
+
+class _Runs(NamedTuple):
+    """Straight runs of sides, chain by chain."""
+
+    chain: Ints
+    begin: Floats  # (n, 2) corner where it begins
+    end: Floats  # (n, 2)
+    axis: Ints  # 0 horizontal, 1 vertical
+    length: Floats  # px
+
+
+class _Spectrum(NamedTuple):
+    height: Floats  # of frequencies 0, 1, 2, ... over `number`, from 0 to 1
+    number: int
+
+
+class _Peak(NamedTuple):
+    period: float
+    height: float
+
+
+_NO_PEAK = _Peak(1.0, 0.0)
+
+
+def as_step(step: float | Step) -> Step:
+    """Return width and height of data points, of which one number tells both."""
+    width, height = np.broadcast_to(np.asarray(step, np.float64), 2).tolist()
+    return width, height
+
+
+def find_step(graph: BoundaryGraph) -> Step:
+    """See how many pixels wide and high the data points of a picture are.
+
+    Parameters
+    ----------
+    graph : BoundaryGraph
+        Its pixel boundary.
+
+    Returns
+    -------
+    tuple of float
+        Width and height in pixels, 1 where there is no sign of more.
+    """
+    chains = pixel_chains(graph)
+    runs = _runs_of(chains)
+    is_inner = ~_on_frame(graph)[runs.chain]
+    spectra = [_spectrum(runs, axis, is_inner) for axis in (0, 1)]
+    if hexagon := _hexagon(*spectra) or _hexagon(*spectra[::-1]):
+        return hexagon, hexagon
+    peaks = [_peak(spectrum, _PEAK) for spectrum in spectra]
+    is_stair, is_step = _stairs(runs, is_inner)
+    found = [_width(runs.length, is_stair & (runs.axis == a), is_step & (runs.axis == a), peaks[a]) for a in (0, 1)]
+    width, height = (found[a] or found[1 - a] or 1.0 for a in (0, 1))
+    return width, height
+
+
+def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
+    """Draw pixel chains anew in data points.
+
+    Parameters
+    ----------
+    chains : PixelChains
+        The pixel boundary.
+    step : tuple of float
+        Width and height of data points, in pixels.
+
+    Returns
+    -------
+    PixelChains
+        The same chains, coordinates and picture divided by `step`: what enlarging each pixel of a picture gives comes
+        back as that picture's own pixel boundary.
+    """
+    if step == (1.0, 1.0):
+        return chains
+    graph, size = chains.graph, np.array(step)
+    runs = _runs_of(chains)
+    number = np.maximum(np.floor(runs.length / size[runs.axis] + 0.5).astype(np.int64), 1)
+    is_closed = graph.chain_points[graph.chain_offsets[:-1]] == graph.chain_points[graph.chain_offsets[1:] - 1]
+    is_closed &= chains.side[graph.chain_offsets[:-1]] != PIXEL_CORNER
+    begin, end = runs.begin / size, runs.end / size
+    raw, side, offsets = _draw(runs.chain, begin, end, runs.axis, number, is_closed)
+    return PixelChains(_graph(graph, raw, offsets, is_closed, size), side)
+
+
+def _graph(graph: BoundaryGraph, raw: Floats, offsets: Ints, is_closed: Flags, size: Floats) -> BoundaryGraph:
+    """Put dense points into a graph: the ends of chains first, as they were, then the others chain by chain."""
+    ends = np.stack([graph.chain_points[graph.chain_offsets[:-1]], graph.chain_points[graph.chain_offsets[1:] - 1]], 1)
+    ends[is_closed] = -1
+    used, node = np.unique(ends, return_inverse=True)
+    used, node = used[used >= 0], node.reshape(-1, 2) - np.count_nonzero(used < 0)
+    ids = numbered(offsets, node, len(used))
+    points = np.empty((int(ids.max()) + 1, 2))
+    points[ids] = raw
+    kind = np.full(len(points), PointKind.FREE, np.uint8)
+    kind[ids[np.repeat(_on_frame(graph), np.diff(offsets))]] = PointKind.FRAME
+    kind[: len(used)] = graph.point_kind[used]
+    shape = tuple((np.array(graph.shape) / size[::-1]).tolist())
+    return replace(graph, points=points, point_kind=kind, chain_offsets=offsets, chain_points=ids, shape=shape)
+
+
+def _on_frame(graph: BoundaryGraph) -> Flags:
+    """Tell which chains lie on the picture's border."""
+    return np.asarray(graph.point_kind[graph.chain_points[graph.chain_offsets[:-1] + 1]] == PointKind.FRAME)
+
+
+def _runs_of(chains: PixelChains) -> _Runs:
+    """Find the straight runs of all chains: from an end or a bend to the next."""
+    graph = chains.graph
+    return _Runs(*_trace(graph.points[graph.chain_points], chains.side, np.array(graph.chain_offsets)))
+
+
+@kernel
+def _trace(points: Floats, side: Ints, offsets: Ints) -> tuple[Ints, Floats, Floats, Ints, Floats]:
+    chain, axis = np.empty(len(side), np.int64), np.empty(len(side), np.int64)
+    begin, end, length = np.empty((len(side), 2)), np.empty((len(side), 2)), np.empty(len(side))
+    n = 0
+    for c in range(len(offsets) - 1):
+        first, last = offsets[c], offsets[c + 1] - 1
+        is_open = side[first] == PIXEL_CORNER
+        x, y = points[first, 0], points[first, 1]
+        if not is_open:  # it begins beside a bend
+            x, y = _bend(points, side, last - 1, first)
+        for i in range(first + is_open, last):
+            is_last = i == last - 1
+            if side[i] == PIXEL_CORNER or (side[i + 1] == side[i] and not (is_last and not is_open)):
+                continue
+            if not is_last and side[i + 1] == PIXEL_CORNER:
+                continue
+            if is_last and is_open:
+                px, py = points[last, 0], points[last, 1]
+            else:
+                px, py = _bend(points, side, i, i + 1)
+            chain[n], axis[n], length[n] = c, side[i], abs(px - x) + abs(py - y)
+            begin[n, 0], begin[n, 1], end[n, 0], end[n, 1] = x, y, px, py
+            x, y = px, py
+            n += 1
+    return chain[:n].copy(), begin[:n].copy(), end[:n].copy(), axis[:n].copy(), length[:n].copy()
+
+
+@kernel
+def _bend(points: Floats, side: Ints, i: int, j: int) -> tuple[float, float]:
+    """Corner between two mid-sides, of which one lies across."""
+    if side[i] == ACROSS:
+        return points[j, 0], points[i, 1]
+    return points[i, 0], points[j, 1]
+
+
+@kernel
+def _draw(
+    chain: Ints, begin: Floats, end: Floats, axis: Ints, number: Ints, is_closed: Flags
+) -> tuple[Floats, Ints, Ints]:
+    """Put `number` sides on each run: their middles, and the corners between them."""
+    total = 2 * len(is_closed)
+    for r in range(len(chain)):
+        total += 2 * number[r]
+    raw, side, offsets = np.empty((total, 2)), np.empty(total, np.int64), np.zeros(len(is_closed) + 1, np.int64)
+    n = 0
+    for r in range(len(chain)):
+        c = chain[r]
+        if (r == 0 or chain[r - 1] != c) and not is_closed[c]:
+            raw[n, 0], raw[n, 1], side[n] = begin[r, 0], begin[r, 1], PIXEL_CORNER
+            n += 1
+        for k in range(1, 2 * number[r]):
+            t = k / (2.0 * number[r])
+            raw[n, 0] = begin[r, 0] + t * (end[r, 0] - begin[r, 0])
+            raw[n, 1] = begin[r, 1] + t * (end[r, 1] - begin[r, 1])
+            side[n] = axis[r] if k % 2 else PIXEL_CORNER
+            n += 1
+        if r == len(chain) - 1 or chain[r + 1] != c:
+            if is_closed[c]:
+                raw[n, 0], raw[n, 1], side[n] = raw[offsets[c], 0], raw[offsets[c], 1], side[offsets[c]]
+            else:
+                raw[n, 0], raw[n, 1], side[n] = end[r, 0], end[r, 1], PIXEL_CORNER
+            n += 1
+            offsets[c + 1] = n
+    return raw[:n].copy(), side[:n].copy(), offsets
+
+
+def _spectrum(runs: _Runs, axis: int, is_inner: Flags) -> _Spectrum:
+    """Return how periodic the places of the sides across an axis are."""
+    across = is_inner & (runs.axis != axis)
+    place, weight = runs.end[across, axis].astype(np.int64), runs.length[across]
+    span = int(np.ptp(place)) if len(place) else 0
+    if weight.sum() < _FEWEST_SIDES or span == 0:
+        return _Spectrum(np.zeros(1), 1)
+    number = _FINENESS * span
+    return _Spectrum(np.abs(np.fft.rfft(np.bincount(place - place.min(), weight), number)) / weight.sum(), number)
+
+
+def _peak(spectrum: _Spectrum, least: float) -> _Peak:
+    """Find the longest clear period, of at least that height."""
+    height, number = spectrum
+    low, high = int(np.ceil(number / min(_LONGEST, number / _FINENESS / 4))), len(height) - 1
+    if low >= high:
+        return _NO_PEAK
+    least = max(least, _OF_HIGHEST * float(height[low : high + 1].max()))
+    is_peak = (height >= least) & (height == maximum_filter1d(height, 2 * _BESIDE + 1))
+    found = low + np.flatnonzero(is_peak[low : high + 1])
+    return _Peak(number / found[0], float(height[found[0]])) if len(found) else _NO_PEAK
+
+
+def _hexagon(along: _Spectrum, up: _Spectrum) -> float | None:
+    """Return the width of hexagons whose rows lie one above the other; None if there are none.
+
+    Their upright sides are half a width apart, sqrt(3) times as near as their rows.
+    """
+    row, column = _peak(up, _PEAK), _peak(along, _HEX_CLEAR)
+    if row.height < _CLEAR or row.period <= _HEX_LEAST or abs(row.period / column.period - np.sqrt(3.0)) > _HEX_OFF:
+        return None
+    return _whole(2.0 * column.period)
+
+
+def _stairs(runs: _Runs, is_inner: Flags) -> tuple[Flags, Flags]:
+    """Tell which runs stand in stairs, between a left and a right bend, and which of them are steps."""
+    along = runs.end - runs.begin
+    turn = np.zeros(len(along))  # at the end of each run; 0 at the end of its chain
+    same = runs.chain[1:] == runs.chain[:-1]
+    turn[:-1][same] = np.sign(along[:-1, 0] * along[1:, 1] - along[:-1, 1] * along[1:, 0])[same]
+    _, which, times = np.unique(runs.end[turn != 0.0], axis=0, return_inverse=True, return_counts=True)
+    turn[np.flatnonzero(turn)[times[which.ravel()] > 1]] = 0.0  # two chains bend there: pixels that touch at a corner
+    between = np.zeros(len(along), bool)
+    between[1:-1] = (turn[:-2] * turn[1:-1] < 0.0)[: max(len(along) - 2, 0)]
+    between &= is_inner
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], between, [False]]).astype(np.int8)))
+    number = np.diff(edges)[::2]
+    is_stair = np.zeros(len(along), bool)
+    is_stair[between] = np.repeat(number >= _IN_A_ROW, number)
+    longest = np.minimum(np.roll(runs.length, 1), np.roll(runs.length, -1))
+    return is_stair, is_stair & (runs.length <= longest)
+
+
+def _width(length: Floats, is_stair: Flags, is_step: Flags, peak: _Peak) -> float | None:
+    """Tell the width of steps that the peak of the spectrum confirms; 1 if it does not, None where steps are few."""
+    steps = np.rint(length[is_step]).astype(np.int64)
+    if len(steps) < _FEWEST_STEPS:
+        return None
+    count = np.bincount(steps, minlength=2)
+    m = int(np.argmax(count[:-1] + count[1:]))
+    alike = steps[(steps == m) | (steps == m + 1)]
+    mean = float(alike.mean())
+    short = float(np.mean(length[is_stair] < _SHORT * m))
+    is_clear = peak.height >= _CLEAR and abs(peak.period - mean) <= _OFF
+    if not (is_clear and len(alike) >= _ALIKE * len(steps) and mean >= _LEAST_MEAN and short <= _FEW_SHORT):
+        return 1.0
+    return _whole(peak.period)
+
+
+def _whole(period: float) -> float:
+    return float(round(period)) if abs(period - round(period)) <= _WHOLE * period else period
