@@ -63,7 +63,7 @@ def write_ansys(
         File to write; replaced only when all of it was written.
     analysis : str, optional
         ``plane stress`` (PLANE182 or 183 with thickness, the default in the plane), ``plane strain``, ``axisymmetric``
-        (turn the mesh so that y is the axis, as Ansys has it), ``heat`` (PLANE55, PLANE77, SOLID70) or ``solid``
+        (x is the radius), ``heat`` (PLANE55, PLANE77, SOLID70) or ``solid``
         (SOLID185, the default of hexes).
     thickness : float
         Out of the plane, in plane stress.
