@@ -199,7 +199,7 @@ class MeshOptions:
             raise InputError(f"sizes_between has {list(self.sizes_between)!r}; give pairs of materials, as (1, 2)")
         # each stage checks its own options: now, not after minutes of work
         self.meshing(None)
-        self.smoothing(None, self.step)
+        self.smoothing(None)
         self.absorbing(None)
         self.segmentation()
         self.reading()
@@ -273,9 +273,9 @@ class MeshOptions:
         return AbsorbOptions(self.tolerance, keep, self.policy, step)
 
     def smoothing(
-        self, materials: Materials | None, step: Literal["auto"] | float | tuple[float, float]
+        self, materials: Materials | None, step: float | tuple[float, float] | None = None
     ) -> SmoothingOptions:
-        """Return the options of smoothing, for data points of a width and a height."""
+        """Return the options of smoothing, for the data points that were seen."""
         return SmoothingOptions(
             size=self.size,
             boundary_size=self.boundary_size,
@@ -285,7 +285,7 @@ class MeshOptions:
             max_shift=self.max_shift,
             material_sizes=self._sizes(materials),
             sizes_between=self._sizes_between(materials),
-            step=step,
+            step=self.step if step is None else step,
             tolerance=self.tolerance,
             join=self.join,
             edge_multiple=EFFORTS[self.effort].edge_multiple,

@@ -45,7 +45,7 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
     PixelChains
         The same chains, coordinates and picture divided by `width`.
     """
-    curves, ends = curves_of(chains)
+    curves, ends = curves_of(*chains)
     room = _ROOM * local_feature_size(curves.raw, curves, width, _ARC_RATIO)
     stays = np.zeros(len(curves.ends), bool)
     while True:

@@ -25,8 +25,13 @@ class PixelChains(NamedTuple):
 
 def pixel_chains(graph: BoundaryGraph) -> PixelChains:
     """Tell what the points of a pixel boundary are: the middle of a horizontal side lies on half columns."""
-    is_half = graph.points[graph.chain_points] % 1.0 != 0.0
-    return PixelChains(graph, np.where(is_half[:, 0], ACROSS, np.where(is_half[:, 1], UP, PIXEL_CORNER)))
+    return PixelChains(graph, sides_of(graph.points[graph.chain_points]))
+
+
+def sides_of(points: Floats) -> Ints:
+    """Tell what points of a pixel boundary are."""
+    is_half = points % 1.0 != 0.0
+    return np.where(is_half[:, 0], ACROSS, np.where(is_half[:, 1], UP, PIXEL_CORNER))
 
 
 class Curves(NamedTuple):
@@ -52,9 +57,9 @@ class Ends(NamedTuple):
     sockets: Ints  #: 2 * chain + 0 for its start or 1 for its end
 
 
-def curves_of(chains: PixelChains) -> tuple[Curves, Ends]:
-    """Unpack a pixel boundary."""
-    graph = chains.graph
+def curves_of(graph: BoundaryGraph, side: Ints | None = None) -> tuple[Curves, Ends]:
+    """Unpack a pixel boundary; `side` tells what its points are where coordinates do not, see `PixelChains`."""
+    side = pixel_chains(graph).side if side is None else side
     raw = graph.points[graph.chain_points]
     first, last = graph.chain_points[graph.chain_offsets[:-1]], graph.chain_points[graph.chain_offsets[1:] - 1]
     is_node = (graph.point_kind == PointKind.JUNCTION) | (graph.point_kind == PointKind.CORNER)
@@ -68,7 +73,7 @@ def curves_of(chains: PixelChains) -> tuple[Curves, Ends]:
     curves = Curves(
         raw,
         arc_lengths(raw, np.array(graph.chain_offsets)),
-        sample_weights(chains.side, np.array(graph.chain_offsets)),
+        sample_weights(side, np.array(graph.chain_offsets)),
         np.array(graph.chain_offsets),
         ends,
         graph.point_kind[second] == PointKind.FRAME,

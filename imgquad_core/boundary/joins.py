@@ -95,7 +95,7 @@ def join_short_chains(chains: PixelChains, shortest: float, farthest: float, uni
     Joined
         The chains that are left, in their order, and the number of joins.
     """
-    curves, ends = curves_of(chains)
+    curves, ends = curves_of(*chains)
     candidates = _short(curves.raw, curves.offsets, curves.ends, shortest)
     if shortest <= 0.0 or not len(candidates):
         return Joined(chains, 0)
@@ -580,7 +580,7 @@ def _nodes_in_conflict(chains: PixelChains, net: _Net, which: Ints, units: Float
 
 def _changed_order(chains: PixelChains, net: _Net, which: Ints) -> Flags:
     """Tell which chains leave a node in another order than they did."""
-    curves, ends = curves_of(chains)
+    curves, ends = curves_of(*chains)
     ring, _ = _rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
     new = np.full(len(net.gone), -1, np.int64)
     new[which] = np.arange(len(which))

@@ -140,7 +140,7 @@ class SmoothingOptions:
         what="a length",
         least=0.0,
         unit="px",
-        told="two data points, or the tolerance",
+        told="auto: two data points, or the tolerance",
         topic="boundaries",
     )
     edge_multiple: Literal[4, 12] = option(

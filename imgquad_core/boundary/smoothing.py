@@ -67,7 +67,7 @@ def smooth_boundaries(
     if width > 1.0:
         chains = averaged(chains, width, UNITS * np.array(step))
         true = _TrueShape.of(graph.shape, shape, (step[0] * width, step[1] * width))
-    curves, ends = curves_of(chains)
+    curves, ends = curves_of(*chains)
     curves, is_corner = find_corners(curves)
     room = _room(curves, is_corner, options.max_shift)
     node = place_junctions(curves, ends, room, chains.graph.shape)

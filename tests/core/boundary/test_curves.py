@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from imgquad_core.boundary.curves import arc_lengths, curves_of, pin_ends, sample_weights, started_at
+from imgquad_core.boundary.curves import arc_lengths, curves_of, pin_ends, sample_weights, sides_of, started_at
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.model import PointKind
 from support.labels import disc, label_image, voronoi
@@ -43,7 +43,7 @@ def test_a_side_at_a_step_weighs_the_square_of_the_lesser_run() -> None:
     step = [(3.0, 2.5)]
     low = [(x, 2.0) for x in (3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 6.5, 7.0)]
     points = np.array(top + step + low)
-    weight = sample_weights(points, np.array([0, len(points)]))
+    weight = sample_weights(sides_of(points), np.array([0, len(points)]))
     assert weight[len(top)] == 9.0
     is_side = (points % 1 != 0).any(axis=1)
     others = is_side & (np.arange(len(points)) != len(top))

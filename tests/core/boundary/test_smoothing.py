@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.boundary import withdrawal
 from imgquad_core.boundary.areas import enclosed_areas, restore_areas
-from imgquad_core.boundary.curves import curves_of, per_point, pixel_chains
+from imgquad_core.boundary.curves import curves_of, per_point
 from imgquad_core.boundary.extraction import ExtractionOptions, extract_boundaries
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.errors import InputError
@@ -94,7 +94,7 @@ def test_a_window_with_two_samples_leaves_its_point() -> None:
 def test_hopeless_curves_fall_back_to_the_pixel_boundary(size: float, rounds: int) -> None:
     patience = withdrawal.Patience(gentle=min(rounds, 8), curved=rounds, most=rounds + 6)
     raw = extract_boundaries(label_image(np.random.default_rng(8).integers(0, 3, (14, 14))))
-    curves, ends = curves_of(pixel_chains(raw))
+    curves, ends = curves_of(raw)
     wild = curves.raw + np.random.default_rng(1).normal(0.0, 2.0, curves.raw.shape)
     wild = np.clip(wild, 0.0, 14.0)
     wild[per_point(curves, curves.is_frame)] = curves.raw[per_point(curves, curves.is_frame)]

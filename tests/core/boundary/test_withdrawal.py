@@ -9,6 +9,8 @@ from imgquad_core.arrays import Floats
 from imgquad_core.boundary.curves import curves_of
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.nodes import Nodes, number_nodes, place_nodes, points_at
+from imgquad_core.boundary.options import SmoothingOptions
+from imgquad_core.boundary.smoothing import smooth_boundaries
 from imgquad_core.boundary.true_shape import stretch
 from imgquad_core.boundary.withdrawal import Draft, Patience, _least_segments, _with_neighbours, place_freely
 from imgquad_core.geometry.conflicts import UNITS, snapped
@@ -77,14 +79,15 @@ def test_neighbours_are_the_chains_that_meet_there() -> None:
 def test_a_stretched_picture_has_its_corners_frame_and_areas(shape: tuple[int, int]) -> None:
     graph = extract_boundaries(label_image(voronoi(40, 50, 7, 4)))
     curves, ends = curves_of(graph)
-    new, stretched, moved, node, smooth = stretch(graph, curves, ends, ends.place, curves.raw, shape)
+    stretched, moved, node, smooth = stretch(curves, ends, ends.place, curves.raw, graph.shape, shape)
     share = np.array([shape[1] / 50, shape[0] / 40])
-    assert new.shape == shape
     assert np.allclose(stretched.raw, curves.raw * share)
     assert np.array_equal(node, moved.place)
     assert np.array_equal(smooth, stretched.raw)
     assert set(np.unique(stretched.raw[curves.raw[:, 0] == 50, 0])) == {float(shape[1])}
-    assert np.allclose(new.region_pixels, graph.region_pixels * share.prod(), atol=0.5)
+    made = smooth_boundaries(graph, SmoothingOptions(size=4.0), shape)
+    assert made.shape == shape
+    assert np.allclose(made.region_pixels, graph.region_pixels * share.prod(), atol=0.5)
     step = np.hypot(*(stretched.raw[1] - stretched.raw[0]))
     assert stretched.arc[1] - stretched.arc[0] == pytest.approx(step)
 
