@@ -23,9 +23,9 @@ from imgquad_core.measures.quality import quality_report
 from imgquad_core.mesher.efforts import EFFORTS
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.options import MeshOptions
-from imgquad_core.picture.reading import read_picture
 from imgquad_core.picture.segmentation import segment_picture
 from imgquad_core.picture.selection import crop_image
+from imgquad_core.reading.formats import read_picture
 from processes import answer, mesh_picture
 from quality import BEST_ROUTE, ROCKS, SIDE, SIZE
 from rocks import SOURCE, draw_rock

@@ -20,8 +20,8 @@ from imgquad_core.measures.quality import quality_report
 from imgquad_core.mesher import mesh_boundaries
 from imgquad_core.model import BoundaryGraph, QuadMesh
 from imgquad_core.options import MeshOptions
-from imgquad_core.picture.reading import read_picture
 from imgquad_core.picture.segmentation import segment_picture
+from imgquad_core.reading.formats import read_picture
 from quality import B1, B2, SIDE, SIZE
 from rocks import SOURCE, draw_rock
 

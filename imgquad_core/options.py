@@ -13,15 +13,8 @@ from .boundary import ExtractionOptions, SmoothingOptions
 from .declared import check, option, same_as
 from .errors import InputError
 from .mesher import EFFORTS, MeshingOptions
-from .picture import (
-    AbsorbOptions,
-    Calibration,
-    DenoiseOptions,
-    ReadOptions,
-    SegmentationOptions,
-    asked_placement,
-    assert_placement,
-)
+from .picture import AbsorbOptions, DenoiseOptions, SegmentationOptions
+from .reading import Calibration, ReadOptions, asked_placement, assert_placement
 
 if TYPE_CHECKING:
     from .model import Materials

@@ -36,10 +36,7 @@ from .picture import (
     Absorbed,
     Absorption,
     Box,
-    Calibration,
     DenoiseOptions,
-    Picture,
-    ReadOptions,
     Removal,
     Segmentation,
     SegmentationOptions,
@@ -51,13 +48,11 @@ from .picture import (
     drop_materials,
     enlarged_labels,
     list_removed,
-    picture_of,
-    read_picture,
     remove_noise,
     segment_picture,
-    size_note,
     sizes_by_number,
 )
+from .reading import Calibration, Picture, ReadOptions, picture_of, read_picture, size_note
 
 Source: TypeAlias = "str | Path | NDArray[Any] | LabelImage | Picture"
 #: called with the name of the stage that starts, its number from 0, and the number of stages

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from imgquad_core.arrays import Bytes, Flags, Ints, Labels
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, LabelImage, Materials
+from imgquad_core.reading.picture import Picture
 
 from .codes import codes_of, numbered, values_of_codes
 from .flat_colours import without_blends
-from .picture import Picture
 
 #: grey labels whose levels are nearer than this are shown in colours instead
 VISIBLE = 8

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
 from imgquad_core.jit import kernel
+from imgquad_core.reading.picture import Picture
 
 from .blends import find_rims, relabel_rims
 from .codes import Numbered
 from .levels import levels_of
-from .picture import Picture
 
 #: least contrast, in levels, of a rim between two flat colours
 RIM = 4.0

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags, Ints
 from imgquad_core.jit import kernel
+from imgquad_core.reading.picture import Picture
 
 from .codes import Numbered, codes_of, numbered, values_of_codes
-from .picture import Picture
 
 #: pictures with no more values than this are labels
 FEW = 8

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags, Floats, Singles
 from imgquad_core.jit import kernel
+from imgquad_core.reading.picture import Picture
 
-from .picture import Picture
 from .total_variation import total_variation
 
 #: part of the pixels at each end that may leave the range of levels

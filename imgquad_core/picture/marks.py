@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from imgquad_core.arrays import Flags, Floats, Labels, Singles
 from imgquad_core.errors import InputError
 from imgquad_core.model import LabelImage, Materials
+from imgquad_core.reading.formats import read_picture
+from imgquad_core.reading.picture import Picture, picture_of
 
 from .codes import codes_of, numbered
 from .exact_colours import exact_labels
 from .levels import Levels, filtered_strips, noise_of, squared_gradient
-from .picture import Picture, picture_of
-from .reading import read_picture
 
 #: a picture of marks with more colours than this was blurred or saved as JPEG
 MOST = 64

@@ -8,8 +8,7 @@ import numpy as np
 
 from imgquad_core.arrays import Floats
 from imgquad_core.model import LabelImage, Materials
-
-from .picture import Crystal, Picture
+from imgquad_core.reading.picture import Crystal, Picture
 
 
 def as_told(image: LabelImage, picture: Picture) -> LabelImage:

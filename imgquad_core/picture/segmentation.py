@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from imgquad_core.arrays import Flags, Floats
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, LabelImage, Materials
+from imgquad_core.reading.picture import Picture, picture_of
 
 from .classes import APART
 from .exact_colours import exact_labels, with_minus_one
@@ -19,7 +20,6 @@ from .kinds import Kind, kind_of
 from .levels import NOISY, levels_of
 from .marks import grow_from, marks_of
 from .options import SegmentationOptions
-from .picture import Picture, picture_of
 from .raw import Found, find_classes, find_nearest
 from .voids import fill_void, void_clusters
 

@@ -18,7 +18,8 @@ from imgquad_core.declared import check, declarations, option, same_as
 from imgquad_core.errors import InputError
 from imgquad_core.fe import ElementOptions
 from imgquad_core.mesher import EFFORTS, MeshingOptions
-from imgquad_core.picture import DenoiseOptions, ReadOptions, SegmentationOptions
+from imgquad_core.picture import DenoiseOptions, SegmentationOptions
+from imgquad_core.reading import ReadOptions
 
 OPTIONS = (
     MeshOptions,

@@ -9,7 +9,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from imgquad_core.model import Materials
-from imgquad_core.picture import Calibration
+from imgquad_core.reading import Calibration
 
 NUMBERS, NAMES, COLORS = MATERIAL_FIELDS = ("material_numbers", "material_names", "material_colors")
 #: of grains: phase and Bunge's Euler angles (degrees, NaN where unknown) of each

@@ -112,18 +112,18 @@ def segmented(
     return core.picture.Segmentation(LabelImage(values, materials), quantised)
 
 
-def _segmented(raw: core.picture.Picture, options: core.picture.SegmentationOptions) -> core.picture.Segmentation:
+def _segmented(raw: core.reading.Picture, options: core.picture.SegmentationOptions) -> core.picture.Segmentation:
     found = core.picture.segment_picture(raw, options)
     return replace(found, image=core.picture.as_told(found.image, raw))
 
 
-def _picture(image: pv.ImageData, name: str, values: NDArray[Any]) -> core.picture.Picture:
+def _picture(image: pv.ImageData, name: str, values: NDArray[Any]) -> core.reading.Picture:
     """Return the picture in an image, with what `imgquad_mesh.read` has stored beside its values."""
     if name != PICTURE or PICTURE not in image.cell_data:
-        return core.picture.picture_of(values)
+        return core.reading.picture_of(values)
     masks = {key: image_array(image, key) > 0 for key in (VOID_PIXELS, OPAQUE) if key in image.cell_data}
     palette = np.asarray(image.field_data[PALETTE], np.uint8) if PALETTE in image.field_data else None
-    found = core.picture.Picture(values, palette) if palette is not None else core.picture.picture_of(values)
+    found = core.reading.Picture(values, palette) if palette is not None else core.reading.picture_of(values)
     return replace(found, void=masks.get(VOID_PIXELS), opaque=masks.get(OPAQUE))
 
 

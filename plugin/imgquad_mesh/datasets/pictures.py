@@ -10,10 +10,10 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from imgquad_core.picture.naming import as_told
-from imgquad_core.picture.options import ReadOptions
-from imgquad_core.picture.picture import Picture
-from imgquad_core.picture.reading import read_picture
 from imgquad_core.picture.segmentation import segment_picture
+from imgquad_core.reading.formats import read_picture
+from imgquad_core.reading.options import ReadOptions
+from imgquad_core.reading.picture import Picture
 
 from .fields import put_calibration, put_materials
 from .images import MATERIAL, OPAQUE, PALETTE, PICTURE, VOID_PIXELS

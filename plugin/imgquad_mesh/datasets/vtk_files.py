@@ -14,10 +14,10 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
-from imgquad_core.picture.calibration import Calibration, size_of
-from imgquad_core.picture.decoding import Stack, assert_pixels
-from imgquad_core.picture.options import ReadOptions
-from imgquad_core.picture.picture import Picture, picture_of
+from imgquad_core.reading.calibration import Calibration, size_of
+from imgquad_core.reading.decoding import Stack, assert_pixels
+from imgquad_core.reading.options import ReadOptions
+from imgquad_core.reading.picture import Picture, picture_of
 
 from .fields import materials_of
 from .images import MATERIAL, pixel_counts

@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
-from imgquad_core.picture.grains import (
+from imgquad_core.reading.formats import Picture, ReadOptions, read_picture
+from imgquad_core.reading.grains import (
     LAUE_GROUPS,
     crystal_symmetries,
     disorientation,
@@ -20,7 +21,6 @@ from imgquad_core.picture.grains import (
     product,
     quaternions_of,
 )
-from imgquad_core.picture.reading import Picture, ReadOptions, read_picture
 
 
 def random_turns(n: int, seed: int = 0) -> NDArray[np.float64]:

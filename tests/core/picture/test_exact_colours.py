@@ -9,7 +9,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.model import VOID
 from imgquad_core.picture.codes import codes_of, numbered
 from imgquad_core.picture.exact_colours import dark_to_light, exact_labels
-from imgquad_core.picture.picture import picture_of
+from imgquad_core.reading.picture import picture_of
 
 
 @pytest.mark.parametrize("n", [1, 5, 255, 256, 257, 400])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from imgquad_core.errors import InputError
-from imgquad_core.picture.reading import CONVERTED_BY, ReadOptions, read_picture
+from imgquad_core.reading.formats import CONVERTED_BY, ReadOptions, read_picture
 
 VOLUME = (np.arange(3 * 20 * 30).reshape(3, 20, 30) // 7 % 200).astype(np.uint8)
 PLANE = VOLUME[1]

@@ -11,9 +11,9 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from imgquad_core.picture.kinds import kind_of
-from imgquad_core.picture.picture import Picture, picture_of
-from imgquad_core.picture.reading import read_picture
 from imgquad_core.picture.segmentation import segment_picture
+from imgquad_core.reading.formats import read_picture
+from imgquad_core.reading.picture import Picture, picture_of
 
 RAW = {"bone_trabecular_uct_0000", "carbonate_uct_raw", "ebsd_ti_orientation_raw", "oof2_ellipses_noise"}
 RAW |= {"rock_sandstone_xpl_2a"}

@@ -9,9 +9,9 @@ from scipy import ndimage
 
 from imgquad_core.picture.levels import levels_of, noise_of
 from imgquad_core.picture.noise import automatic_limits, remove_noise
-from imgquad_core.picture.picture import picture_of
 from imgquad_core.picture.segmentation import SegmentationOptions, segment_picture
 from imgquad_core.picture.total_variation import total_variation
+from imgquad_core.reading.picture import picture_of
 
 SIDE = 220
 Y, X = np.mgrid[:SIDE, :SIDE] + 0.5

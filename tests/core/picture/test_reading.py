@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from imgquad_core.errors import InputError
-from imgquad_core.picture.reading import ReadOptions, picture_of, read_picture
+from imgquad_core.reading.formats import ReadOptions, picture_of, read_picture
 
 GREY = (np.arange(12).reshape(3, 4) * 20).astype(np.uint8)
 RGB = np.stack([GREY, GREY[::-1], 255 - GREY], axis=-1)

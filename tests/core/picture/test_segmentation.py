@@ -17,10 +17,10 @@ from imgquad_core.model import VOID
 from imgquad_core.picture.blends import find_rims
 from imgquad_core.picture.classes import classes_of
 from imgquad_core.picture.noise import automatic_limits, remove_noise
-from imgquad_core.picture.picture import Picture, picture_of
 from imgquad_core.picture.quantisation import Histogram, errors_of, kmeans_centres, otsu_centres
-from imgquad_core.picture.reading import read_picture
 from imgquad_core.picture.segmentation import SegmentationOptions, segment, segment_picture
+from imgquad_core.reading.formats import read_picture
+from imgquad_core.reading.picture import Picture, picture_of
 
 COLORS = np.array(
     [[230, 25, 75], [60, 180, 75], [255, 225, 25], [0, 130, 200], [145, 30, 180], [128, 128, 128]], np.uint8

@@ -15,7 +15,7 @@ import tifffile
 from numpy.typing import NDArray
 
 from imgquad_core.errors import InputError
-from imgquad_core.picture.reading import ReadOptions, read_picture
+from imgquad_core.reading.formats import ReadOptions, read_picture
 
 GREY = (np.arange(40 * 60).reshape(40, 60) % 251).astype(np.uint8)
 RGB = np.stack([GREY, GREY[::-1], 255 - GREY], axis=-1)
@@ -86,7 +86,7 @@ def test_without_imagecodecs_the_compression_and_the_package_are_named(
     written(tmp_path / "a.tif", GREY, compression=compression)
     code = (
         "import sys; sys.modules['imagecodecs'] = None\n"
-        "from imgquad_core.picture.reading import read_picture\n"
+        "from imgquad_core.reading.formats import read_picture\n"
         "try: print(read_picture('a.tif').values.sum())\n"
         "except ValueError as error: print(error)"
     )
