@@ -50,7 +50,6 @@ def test_points_are_marks_too() -> None:
 def test_strokes_in_a_palette_or_clear_picture_name_and_colour_the_materials(tmp_path: Path) -> None:
     colors = np.zeros((8, 3), np.uint8)
     colors[[3, 5, 7]] = [[255, 0, 0], [0, 255, 0], [0, 0, 255]]
-    image = Image.fromarray(strokes().astype(np.uint8)).convert("P")
     image = Image.frombytes("P", (COLS, ROWS), strokes().astype(np.uint8).tobytes())
     image.putpalette(colors.tobytes())
     image.save(tmp_path / "palette.png")
@@ -79,10 +78,12 @@ def test_a_forest_finds_what_looks_like_the_marks() -> None:
     rough = ndimage.gaussian_filter(random.normal(0, 60, (ROWS, COLS)), 1.0)
     grey = np.where(TRUTH == 1, 128 + rough, grey).clip(0, 255).round().astype(np.uint8)  # texture, same mean
     marks = np.where(strokes() == 7, 3, strokes())
+    marks[25:65, 38:42] = marks[44:48, 20:60] = 5
+    marks[75:80, 10:80] = 3
     learnt = segment_picture(grey, SegmentationOptions(marks=marks, learn=True))
     grown = segment(grey, SegmentationOptions(marks=marks)).labels
     truth = np.where(TRUTH == 1, 5, 3)
-    assert (learnt.image.labels == truth).mean() > max(0.95, (grown == truth).mean())
+    assert (learnt.image.labels == truth).mean() > max(0.95, (grown == truth).mean() + 0.05)
     again = segment(grey, SegmentationOptions(marks=marks, learn=True)).labels
     assert (again == learnt.image.labels).all()
 
