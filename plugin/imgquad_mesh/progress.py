@@ -11,6 +11,7 @@ DOING = {
     "read": "reading",
     "segment": "finding materials",
     "denoise": "removing noise",
+    "absorb": "absorbing what is too narrow",
     "boundary": "extracting boundaries",
     "smooth": "smoothing boundaries",
     "mesh": "meshing",

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from imgquad_core.pipeline import STAGES
 from imgquad_mesh import filters
+from imgquad_mesh.progress import DOING
 from support.images import point_image
 
 
@@ -67,6 +69,10 @@ print(took, "numba" in sys.modules)
     seconds, loaded = zip(*(run.stdout.split() for run in runs), strict=True)
     assert set(loaded) == {"False"}
     assert min(map(float, seconds)) < 0.05  # the machine may be busy with something else
+
+
+def test_progress_knows_every_stage() -> None:
+    assert set(STAGES) <= set(DOING)
 
 
 def test_only_pyvista_is_imported_by_the_user(tmp_path: Path) -> None:

@@ -9,8 +9,7 @@ import numpy as np
 import pyvista as pv
 
 import imgquad_core as core
-from imgquad_mesh.datasets.grids import flattened, quads_of, to_fe_grid, to_grid, to_mesh
-from imgquad_mesh.datasets.lines import chain_lines
+from imgquad_mesh import datasets
 from imgquad_mesh.progress import progress_of
 
 from .parameters import checked, choice
@@ -46,8 +45,8 @@ def optimize(
     options = core.cleanup.OptimizationOptions(**checked(effort=effort, threads=threads))
     with progress_of(progress_bar) as begin:
         begin("mesh")
-        given, plane = to_mesh(grid)
-        return to_grid(core.cleanup.optimize(given, options), plane)
+        given, plane = datasets.to_mesh(grid)
+        return datasets.to_grid(core.cleanup.optimize(given, options), plane)
 
 
 def quality(grid: Grid) -> Grid:
@@ -69,7 +68,7 @@ def quality(grid: Grid) -> Grid:
     --------
     pyvista.DataObjectFilters.cell_quality
     """
-    corners, (points, _) = quads_of(grid), flattened(grid)
+    corners, (points, _) = datasets.quads_of(grid), datasets.flattened(grid)
     angles = core.measures.corner_angles(points, corners)
     out = grid.copy()
     out.cell_data["scaled_jacobian"] = core.measures.scaled_jacobian(points, corners)
@@ -94,7 +93,7 @@ def report(grid: Grid) -> dict[str, Any]:
         The fields of `imgquad_core.measures.QualityReport`, and under ``materials`` for each name its ``number``,
         ``quads``, ``regions`` and ``area`` (in the unit of the points, squared).
     """
-    made, _ = to_mesh(grid)
+    made, _ = datasets.to_mesh(grid)
     materials = {
         made.materials.name_of(number): {
             "number": number,
@@ -121,10 +120,10 @@ def boundaries_of_mesh(grid: Grid) -> pv.PolyData:
         One polyline for each chain between two junctions, or closed, with the arrays ``boundary_labels``, ``chain`` and
         ``point_kind`` as `boundaries` gives them.
     """
-    made, plane = to_mesh(grid)
+    made, plane = datasets.to_mesh(grid)
     left_right = np.append(made.region_label, np.int32(-1))[made.chain_regions]
     used, ids = np.unique(made.chain_points, return_inverse=True)
-    return chain_lines(made.points[used], made.chain_offsets, ids, left_right, made.point_kind[used], plane)
+    return datasets.chain_lines(made.points[used], made.chain_offsets, ids, left_right, made.point_kind[used], plane)
 
 
 def quadratic(grid: Grid, nodes: Literal[8, 9] = 8) -> pv.UnstructuredGrid:
@@ -142,8 +141,8 @@ def quadratic(grid: Grid, nodes: Literal[8, 9] = 8) -> pv.UnstructuredGrid:
     pyvista.UnstructuredGrid
         VTK_QUADRATIC_QUAD or VTK_BIQUADRATIC_QUAD cells, and the sets of the mesh as point arrays.
     """
-    made, plane = to_mesh(grid)
-    out = to_fe_grid(core.fe.make_elements(made, core.fe.ElementOptions(order=2, nodes=nodes)))
+    made, plane = datasets.to_mesh(grid)
+    out = datasets.to_fe_grid(core.fe.make_elements(made, core.fe.ElementOptions(order=2, nodes=nodes)))
     out.points = plane.place(np.asarray(out.points)[:, :2])
     return out
 

@@ -13,7 +13,7 @@ import pyvista as pv
 from numpy.typing import ArrayLike, NDArray
 
 import imgquad_core as core
-from imgquad_mesh.datasets import grids, images, lines
+from imgquad_mesh import datasets
 from imgquad_mesh.progress import progress_of
 
 from .grids import Effort
@@ -94,9 +94,9 @@ def segment(
     values |= _marked(image, scalars, marks)
     with progress_of(progress_bar) as begin:
         begin("segment")
-        found = images.segmented(image, scalars, core.picture.SegmentationOptions(**values))
+        found = datasets.segmented(image, scalars, core.picture.SegmentationOptions(**values))
     _warn(found.warnings)
-    return images.with_materials(image, found, scalars)
+    return datasets.with_materials(image, found, scalars)
 
 
 def _marked(image: pv.ImageData, scalars: str | None, marks: Marks) -> dict[str, Any]:
@@ -147,8 +147,8 @@ def remove_noise(
     """
     with progress_of(progress_bar) as begin:
         begin("denoise")
-        found = _without_noise(images.segmented(image, scalars), min_pixels, min_length, policy)
-        return images.with_materials(image, found, scalars)
+        found = _without_noise(datasets.segmented(image, scalars), min_pixels, min_length, policy)
+        return datasets.with_materials(image, found, scalars)
 
 
 def drop_materials(
@@ -171,9 +171,11 @@ def drop_materials(
         A copy with a new array ``material``.
     """
     names = [materials] if isinstance(materials, (str, int)) else materials
-    found = images.segmented(image, scalars)
+    found = datasets.segmented(image, scalars)
     chosen = checked(materials=names)["materials"]
-    return images.with_materials(image, replace(found, image=core.picture.drop_materials(found.image, chosen)), scalars)
+    return datasets.with_materials(
+        image, replace(found, image=core.picture.drop_materials(found.image, chosen)), scalars
+    )
 
 
 def boundaries(
@@ -204,9 +206,9 @@ def boundaries(
     options = core.boundary.ExtractionOptions(**checked(policy=policy))
     with progress_of(progress_bar) as begin:
         begin("boundary")
-        labels = images.segmented(image, scalars).image
+        labels = datasets.segmented(image, scalars).image
         graph = core.pipeline.extract(labels, options)
-        return lines.to_lines(lines.Boundaries(graph, labels.materials, images.image_placement(image, scalars)))
+        return datasets.to_lines(datasets.Boundaries(graph, labels.materials, datasets.image_placement(image, scalars)))
 
 
 def mesh(
@@ -352,17 +354,17 @@ def mesh(
     early = checked(colors=colors, flatten=flatten, learn=learn, fill_void=fill_void)
     early |= checked(drop_transparent=drop_transparent)
     early |= _marked(image, scalars, marks)
-    placement = images.image_placement(image, scalars)
+    placement = datasets.image_placement(image, scalars)
     values |= in_pixels(sizes, unit, placement.pixel_size)
     options = core.MeshOptions(**values, pixel_size=placement.sides)
     columns = _columns(image, checked(sample=sample)["sample"], scalars)
     with progress_of(progress_bar) as begin:
         begin("segment")
-        found = images.segmented(image, scalars, core.picture.SegmentationOptions(**early))
+        found = datasets.segmented(image, scalars, core.picture.SegmentationOptions(**early))
         done = core.pipeline.run(found, options, lambda stage, *_: begin(stage))
     many = core.pipeline.thin_features(done.labels, done.pixel_mesh, options)
     _warn((*found.warnings, *core.pipeline.lost_materials(done), *([many] if many else [])))
-    grid = grids.to_grid(done.pixel_mesh, placement.divided(done.labels.shape, done.boundary.shape))
+    grid = datasets.to_grid(done.pixel_mesh, placement.divided(done.labels.shape, done.boundary.shape))
     _sample(grid, done.pixel_mesh, columns, done.boundary.shape)
     return grid
 
@@ -389,11 +391,11 @@ def in_pixels(sizes: dict[str, Any], unit: Unit, pixel_size: float) -> dict[str,
 
 def _columns(image: pv.ImageData, names: Sequence[str], scalars: str | None) -> dict[str, NDArray[Any]]:
     """Return the arrays that are to be sampled, the top row first."""
-    _, association = images.scalars_of(image, scalars)
+    _, association = datasets.scalars_of(image, scalars)
     for name in names:
-        if images.scalars_of(image, name)[1] != association:
+        if datasets.scalars_of(image, name)[1] != association:
             raise KeyError(f"Data array ({name}) is not one of {association}s, as the scalars are: convert the image.")
-    return {name: images.image_array(image, name) for name in names}
+    return {name: datasets.image_array(image, name) for name in names}
 
 
 def _sample(

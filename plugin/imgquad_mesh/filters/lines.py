@@ -8,8 +8,7 @@ import pyvista as pv
 
 import imgquad_core as core
 from imgquad_core.errors import InputError
-from imgquad_mesh.datasets.grids import to_grid
-from imgquad_mesh.datasets.lines import from_lines, to_lines
+from imgquad_mesh import datasets
 from imgquad_mesh.progress import progress_of
 
 from .grids import Effort
@@ -87,7 +86,7 @@ def smooth(
     sizes = checked(size=size, boundary_size=boundary_size, frame_size=frame_size, material_sizes=material_sizes)
     sizes |= checked(sizes_between=sizes_between, tolerance=tolerance, join=join)
     repeat = checked(periodic=periodic)["periodic"]
-    given = from_lines(lines)
+    given = datasets.from_lines(lines)
     if given.sizes is not None:
         raise InputError("these boundaries are smooth already: smooth those that image.imgquad.boundaries() gave")
     sizes = in_pixels(sizes, unit, given.placement.pixel_size)
@@ -100,7 +99,7 @@ def smooth(
         graph = core.pipeline.smooth(
             given.graph, options, core.boundary.true_shape(shape, given.placement.sides), repeat
         )
-        return to_lines(
+        return datasets.to_lines(
             given._replace(
                 graph=graph,
                 placement=given.placement.divided(shape, graph.shape),
@@ -150,7 +149,7 @@ def quads(
     pyvista.UnstructuredGrid
         As `mesh` gives it.
     """
-    given = from_lines(lines)
+    given = datasets.from_lines(lines)
     if given.sizes is None:
         raise InputError("these boundaries are not smoothed: call .imgquad.smooth(size=...) on them first")
     values: dict[str, Any] = dict(zip(("size", "growth", "material_sizes"), given.sizes, strict=True))
@@ -164,4 +163,4 @@ def quads(
     with progress_of(progress_bar) as begin:
         begin("mesh")
         _, made = core.pipeline.fill_boundaries(given.graph, options, given.materials, given.periodic)
-        return to_grid(made, given.placement)
+        return datasets.to_grid(made, given.placement)

@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 import pyvista_validation
 
-from imgquad_core import MeshOptions
-from imgquad_core.boundary import SmoothingOptions
-from imgquad_core.declared import Declaration, declarations
+import imgquad_core as core
 
 _validation: Any = pyvista_validation  # its overloads are too many for type checkers
 UNITS = ("pixels", "world")
@@ -44,11 +42,11 @@ def _value(name: str, value: Any) -> Any:
 
 
 @cache
-def _declared() -> Mapping[str, Declaration]:
-    return declarations(SmoothingOptions) | declarations(MeshOptions)
+def _declared() -> Mapping[str, core.declared.Declaration]:
+    return core.declared.declarations(core.boundary.SmoothingOptions) | core.declared.declarations(core.MeshOptions)
 
 
-def _limits(declared: Declaration) -> tuple[float, float] | None:
+def _limits(declared: core.declared.Declaration) -> tuple[float, float] | None:
     return None if declared.least is None or declared.most is None else (declared.least, declared.most)
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import pyvista as pv
 
 import imgquad_core as core
-from imgquad_mesh.datasets.fields import materials_of
-from imgquad_mesh.datasets.grids import flattened, quads_of
+from imgquad_mesh import datasets
 from imgquad_mesh.outputs.mesh_picture import material_colors
 
 #: limits of the colour bar and colour map of each measure
@@ -52,7 +51,7 @@ def add_to_plotter(
 def _material_style(grid: pv.UnstructuredGrid | pv.PolyData) -> dict[str, Any]:
     """Return what draws each material in its colour, with its name beside the mesh."""
     numbers = np.asarray(grid.cell_data["material"])
-    materials = materials_of(grid)
+    materials = datasets.materials_of(grid)
     used, index = np.unique(np.searchsorted(materials.labels, numbers), return_inverse=True)
     colors = material_colors(materials)[used]
     names = {place: materials.names[k] for place, k in enumerate(used[:MOST_IN_LEGEND].tolist())}
@@ -89,7 +88,7 @@ def _mark_irregular(plotter: Any, grid: pv.UnstructuredGrid | pv.PolyData) -> No
 
 def on_boundary(grid: pv.UnstructuredGrid | pv.PolyData) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Tell of each point whether it lies on the border or between two materials."""
-    quads = quads_of(grid)
+    quads = datasets.quads_of(grid)
     twins = core.geometry.twins_of(quads, grid.n_points)
     material = np.asarray(grid.cell_data.get("material", np.zeros(len(quads), np.int32)))
     own = np.repeat(material, 4)
@@ -101,7 +100,7 @@ def on_boundary(grid: pv.UnstructuredGrid | pv.PolyData) -> np.ndarray[Any, np.d
 
 def look_at(plotter: Any, grid: pv.UnstructuredGrid | pv.PolyData) -> None:
     """Look at a plane mesh from its front, in parallel projection, with room on the right for the legend."""
-    points, plane = flattened(grid)
+    points, plane = datasets.flattened(grid)
     low, high = points.min(axis=0), points.max(axis=0)
     left, lower, right, upper = plotter.renderer.viewport
     across = plotter.window_size[0] * (right - left) / (plotter.window_size[1] * (upper - lower))

@@ -1,0 +1,29 @@
+from .fields import MATERIAL_FIELDS, materials_of, put_calibration, put_materials
+from .grids import flattened, from_grid, plain_grid, quads_of, to_fe_grid, to_grid, to_mesh
+from .images import image_array, image_placement, scalars_of, segmented, with_materials
+from .lines import Boundaries, chain_lines, from_lines, to_lines
+from .placement import Placement
+
+__all__ = [
+    "MATERIAL_FIELDS",
+    "Boundaries",
+    "Placement",
+    "chain_lines",
+    "flattened",
+    "from_grid",
+    "from_lines",
+    "image_array",
+    "image_placement",
+    "materials_of",
+    "plain_grid",
+    "put_calibration",
+    "put_materials",
+    "quads_of",
+    "scalars_of",
+    "segmented",
+    "to_fe_grid",
+    "to_grid",
+    "to_lines",
+    "to_mesh",
+    "with_materials",
+]
