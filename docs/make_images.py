@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from scipy.ndimage import gaussian_filter
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
@@ -31,6 +32,7 @@ def main(folder: Path) -> None:
     draw_quality({"": made.mesh}, made.labels.shape, folder / "quality.png")
     both = {"imgquad-mesh": made.mesh, "Gmsh": gmsh_mesh(made.mesh, "subdivide-8").mesh}
     draw_quality(both, made.labels.shape, folder / "quality_gmsh.png")
+    draw_sizes(folder / "sizes.png")
 
 
 def draw_chain(made: Run, part: Any, path: Path) -> None:
@@ -58,6 +60,25 @@ def draw_quality(meshes: Mapping[str, QuadMesh], shape: tuple[int, int], path: P
             panel.add_collection(LineCollection(list(mesh.points[mesh.constraints]), colors="black", linewidths=1.2))
             panel.set_title(f"{title}: {_figures(mesh)}", fontsize=8)
     figure.colorbar(quality, ax=panels, label="scaled Jacobian", shrink=0.8)
+    figure.savefig(path, facecolor="white")
+
+
+def coast(n: int = 300) -> Any:
+    """Make a rough coast, labels of n x n pixels."""
+    rng = np.random.default_rng(2)
+    octaves = ((40, 1.0), (12, 0.35), (4, 0.15), (1.5, 0.06))  # width in pixels, share
+    heights = sum(gaussian_filter(rng.normal(size=(n, n)), width) * width * share for width, share in octaves)
+    return (np.asarray(heights) > 0).astype(np.int32)
+
+
+def draw_sizes(path: Path) -> None:
+    """Draw a coast meshed as it is, and with tolerances, side by side."""
+    tolerances = (0.0, 8.0, 16.0)
+    figure, panels = _panels(len(tolerances), (300, 300))
+    for panel, tolerance in zip(panels, tolerances, strict=True):
+        mesh = run(coast(), MeshOptions(size=16.0, tolerance=tolerance)).mesh
+        _add_quads(panel, mesh, COLORS[1 + mesh.quad_material])
+        panel.set_title(f"size 16, tolerance {tolerance:g}: {mesh.n_quads} quads", fontsize=9)
     figure.savefig(path, facecolor="white")
 
 

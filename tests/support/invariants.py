@@ -29,6 +29,24 @@ def assert_valid_mesh(mesh: QuadMesh, image: LabelImage, *, pixel_size: float = 
     assert_materials(mesh, points, image)
 
 
+def assert_simplified_mesh(mesh: QuadMesh, labels: LabelImage) -> None:
+    """Fail unless `mesh` is valid, with the materials of `labels`, its void left out; outlines may have moved."""
+    rows, cols = labels.shape
+    points = np.asarray(mesh.points)
+    assert_arrays(mesh)
+    assert_convex(points, mesh.quads)
+    assert_conforming(mesh)
+    assert_constraints(mesh, points, (cols, rows))
+    assert_topology(mesh, labels)
+    solid = labels.labels != VOID
+    assert np.array_equal(np.unique(mesh.quad_material), np.unique(labels.labels[solid]))
+    if solid.all():
+        p = points[mesh.quads]
+        x, y = p[..., 0], p[..., 1]
+        area = 0.5 * ((x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0]))
+        assert np.isclose(area.sum(), solid.size, rtol=1e-9)
+
+
 def assert_arrays(mesh: QuadMesh) -> None:
     assert mesh.quads.ndim == 2
     assert mesh.quads.shape[1] == 4

@@ -1,0 +1,89 @@
+"""Joins of short chains: four grains that meet nearly in a point get one junction, and all faces stay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from imgquad_core.boundary.curves import pixel_chains
+from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.boundary.joins import join_short_chains
+from imgquad_core.boundary.options import SmoothingOptions
+from imgquad_core.boundary.smoothing import smooth_boundaries
+from imgquad_core.model import BoundaryGraph, PointKind
+from support.labels import any_labels, label_image, voronoi
+from support.planar import check_meshable, check_planar
+
+
+def cross(shift: int, n: int = 40) -> NDArray[np.int32]:
+    """Four grains whose two triple points are `shift` px apart."""
+    y, x = np.mgrid[:n, :n] + 0.5
+    upper, lower = np.where(x > n / 2, 1, 2), np.where(x > n / 2 + shift, 3, 4)
+    return np.where(y < n / 2, upper, lower).astype(np.int32)
+
+
+def joined(labels: NDArray[np.int32], shortest: float) -> tuple[BoundaryGraph, BoundaryGraph]:
+    raw = extract_boundaries(label_image(labels))
+    return raw, join_short_chains(pixel_chains(raw), shortest, max(0.5 * shortest, 1.0)).chains.graph
+
+
+@pytest.mark.parametrize("shift", [1, 2, 5])
+def test_a_short_chain_goes_and_its_ends_become_one_halfway(shift: int) -> None:
+    raw, made = joined(cross(shift), shift + 0.5)
+    assert made.n_chains == raw.n_chains - 1
+    check_planar(made, 1)
+    valence = np.bincount(np.concatenate([made.chain(c)[[0, -1]] for c in range(made.n_chains)]))
+    (four,) = np.flatnonzero(valence == 4)
+    assert made.point_kind[four] == PointKind.JUNCTION
+    assert made.points[four].tolist() == pytest.approx([20 + shift / 2, 20], abs=0.01)
+
+
+def test_longer_chains_stay() -> None:
+    raw, made = joined(cross(5), 4.0)
+    assert np.array_equal(made.chain_points, raw.chain_points)
+    assert np.array_equal(made.points, raw.points)
+
+
+def test_a_lens_stays() -> None:
+    labels = np.zeros((30, 30), np.int32)
+    labels[:, 15:] = 1
+    labels[14:16, 14:16] = 2  # between the ends of its two chains nothing may be joined
+    raw, made = joined(labels, 3.0)
+    assert made.n_chains == raw.n_chains
+
+
+def test_a_corner_of_the_picture_stays_and_takes_what_is_near() -> None:
+    labels = np.zeros((30, 30), np.int32)
+    labels[np.add.outer(np.arange(30), 3 * np.arange(30)) < 40] = 1
+    labels[0, :] = 1
+    _, made = joined(labels, 3.0)
+    corners = made.points[made.point_kind == PointKind.CORNER]
+    assert sorted(map(tuple, corners.tolist())) == [(0, 0), (0, 30), (30, 0), (30, 30)]
+    check_planar(made, 1)
+
+
+@pytest.mark.parametrize("shortest", [2.0, 5.0, 9.0])
+@pytest.mark.parametrize("seed", range(6))
+def test_grains_keep_their_faces_and_no_node_goes_far(seed: int, shortest: float) -> None:
+    labels = voronoi(60, 60, 40, seed)
+    raw, made = joined(labels, shortest)
+    check_planar(made, 1)
+    assert made.n_chains < raw.n_chains
+    nodes = raw.points[raw.point_kind == PointKind.JUNCTION]
+    now = made.points[made.point_kind == PointKind.JUNCTION]
+    nearest = np.hypot(*(nodes[:, None] - now[None]).transpose(2, 0, 1)).min(axis=1)
+    assert nearest.max() <= max(0.5 * shortest, 1.0) + 1e-3
+
+
+@pytest.mark.parametrize("seed", range(40, 70))
+def test_any_picture_stays_planar(seed: int) -> None:
+    graph = extract_boundaries(label_image(any_labels(seed)))
+    check_meshable(smooth_boundaries(graph, SmoothingOptions(2.5, join=6.0)))
+
+
+def test_no_join_where_none_is_asked_for() -> None:
+    graph = extract_boundaries(label_image(cross(1)))
+    assert smooth_boundaries(graph, SmoothingOptions(4.0, join=0.0)).n_chains == graph.n_chains
+    assert smooth_boundaries(graph, SmoothingOptions(4.0, max_shift=0.0)).n_chains == graph.n_chains
+    assert smooth_boundaries(graph, SmoothingOptions(4.0)).n_chains == graph.n_chains - 1

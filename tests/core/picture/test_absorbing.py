@@ -1,0 +1,125 @@
+"""What is thinner than a tolerance goes to its neighbours, what is wider stays where it was."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from imgquad_core.errors import InputError
+from imgquad_core.geometry.corner_rule import corner_rule
+from imgquad_core.picture import AbsorbOptions, absorb_thin, areas_of_origin
+from imgquad_core.picture.absorbing import distances, flood, near_core
+from support.labels import any_labels, label_image, voronoi
+
+Labels = NDArray[np.int32]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_distances_are_those_to_other_labels_and_the_frame(seed: int) -> None:
+    labels = np.ascontiguousarray(any_labels(seed))
+    padded = np.pad(labels, 1, constant_values=-9)
+    slow = np.zeros(padded.shape)
+    for label in np.unique(labels):
+        mine = padded == label
+        slow[mine] = distance_transform_edt(mine)[mine]
+    assert np.allclose(distances(labels), slow[1:-1, 1:-1])
+
+
+def stripe(width: int) -> Labels:
+    labels = np.zeros((60, 60), np.int32)
+    labels[:, 30 : 30 + width] = 1
+    return labels
+
+
+@pytest.mark.parametrize("width", [3, 5, 7])
+def test_a_thin_stripe_goes_and_a_wide_one_stays(width: int) -> None:
+    thin = absorb_thin(label_image(stripe(width)), AbsorbOptions(width + 2.0)).image.labels
+    assert (thin == 0).all()
+    wide = absorb_thin(label_image(stripe(width + 3)), AbsorbOptions(width + 1.0)).image.labels
+    assert np.array_equal(wide, stripe(width + 3))
+
+
+def test_a_kept_material_loses_nothing() -> None:
+    labels = stripe(3)
+    made = absorb_thin(label_image(labels), AbsorbOptions(8.0, (1,)))
+    assert (made.image.labels[labels == 1] == 1).all()
+    assert [row.lost for row in made.materials if row.material == 1] == [0]
+
+
+def test_a_bridge_is_cut_and_both_sides_share_it_alike() -> None:
+    labels = np.zeros((60, 90), np.int32)
+    labels[10:50, 10:35] = labels[10:50, 55:80] = labels[28:31, 35:55] = 1
+    made = absorb_thin(label_image(labels), AbsorbOptions(10.0))
+    after = made.image.labels
+    assert (after[20:40, 44:46] == 0).all()
+    assert (after[15:45, 15:30] == 1).all()
+    assert [(row.regions, row.absorbed) for row in made.materials] == [(1, 0), (1, 0)]
+
+
+def test_small_regions_are_gone_and_said_to_be() -> None:
+    labels = np.zeros((60, 60), np.int32)
+    labels[20:24, 20:24] = 1
+    labels[40:55, 40:55] = 2
+    made = absorb_thin(label_image(labels), AbsorbOptions(8.0))
+    assert set(np.unique(made.image.labels)) == {0, 2}
+    gone = next(row for row in made.materials if row.material == 1)
+    assert (gone.regions, gone.absorbed, gone.pixels, gone.lost) == (1, 1, 16, 16)
+
+
+def test_void_stays_void() -> None:
+    labels = stripe(3)
+    labels[:, 10:12] = -1
+    after = absorb_thin(label_image(labels), AbsorbOptions(8.0)).image.labels
+    assert np.array_equal(after == -1, labels == -1)
+
+
+def test_a_picture_that_is_thin_all_over_keeps_a_material() -> None:
+    labels = np.random.default_rng(1).integers(0, 3, (40, 40)).astype(np.int32)
+    after = absorb_thin(label_image(labels), AbsorbOptions(8.0)).image.labels
+    assert len(np.unique(after)) >= 1
+    tiny = absorb_thin(label_image(labels[:3, :3]), AbsorbOptions(8.0)).image.labels
+    assert tiny.shape == (3, 3)
+
+
+def test_rests_have_the_area_of_what_they_are_the_rest_of() -> None:
+    before, after = stripe(3), np.zeros((60, 60), np.int32)
+    after[20:, 30:33] = 1
+    areas = areas_of_origin(before, after, corner_rule("minority"))
+    assert areas.sum() == pytest.approx(3600)
+    assert sorted(areas) == pytest.approx([180, 3420], rel=0.03)
+
+
+@pytest.mark.parametrize("tolerance", [2.0, 5.0, 9.0])
+def test_grains_keep_their_areas_as_wanted(tolerance: float) -> None:
+    labels = voronoi(80, 80, 12, 2)
+    made = absorb_thin(label_image(labels), AbsorbOptions(tolerance))
+    large = np.repeat(np.repeat(labels, made.times, axis=0), made.times, axis=1)
+    areas = areas_of_origin(large, made.enlarged.labels, corner_rule("minority"))
+    assert areas.sum() == pytest.approx(large.size, rel=0.02)
+
+
+def test_a_flood_takes_the_nearest() -> None:
+    labels = np.array([[1, 0, 0, 0, 2]], np.int32)
+    kept = labels > 0
+    after, gone = flood(labels, kept)
+    assert after[0, [1, 3]].tolist() == [1, 2]
+    assert gone[0].tolist() == [0, 1, 2, 1, 0]
+
+
+def test_ways_stay_in_their_region() -> None:
+    labels = np.zeros((20, 40), np.int32)
+    labels[:, 20] = 1
+    distance = np.zeros((20, 40))
+    distance[10, 5] = 5.0
+    kept = near_core(labels, distance, 4.0, 12.0)
+    assert kept[10, 17]
+    assert not kept[10, 18]
+    assert not kept[:, 20:].any()
+
+
+@pytest.mark.parametrize("tolerance", [-1.0, 0.5, float("nan")])
+def test_bad_tolerances_are_refused(tolerance: float) -> None:
+    with pytest.raises(InputError, match="tolerance is"):
+        AbsorbOptions(tolerance)
