@@ -54,12 +54,9 @@ def read(path: str | Path, **options: Any) -> pv.ImageData:
 
     Examples
     --------
-    >>> import numpy as np
     >>> import imgquad_mesh
-    >>> np.save("two.npy", np.repeat([[1, 2]], 20, axis=0).repeat(10, axis=1))
-    >>> image = imgquad_mesh.read("two.npy")
-    >>> image.bounds[:4]
-    (0.0, 20.0, 0.0, 20.0)
+    >>> image = imgquad_mesh.read("steel.ang", scalars="grains")  # doctest: +SKIP
+    >>> mesh = image.imgquad.mesh(size=4)  # doctest: +SKIP
     """
     return to_image(read_any(path, ReadOptions(**options)))
 
