@@ -50,7 +50,7 @@ def test_conventions_of_pyvista(function: object) -> None:
 
 
 def test_nothing_heavy_is_loaded_before_the_first_filter() -> None:
-    """PyVista finds the accessor by itself; importing it costs under 50 ms of work and leaves Numba and the core alone."""
+    """PyVista finds the accessor by itself; importing it costs under 50 ms of work and leaves Numba alone."""
     script = """
 import sys, time
 import pyvista as pv
