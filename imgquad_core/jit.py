@@ -8,17 +8,31 @@ once more. What it costs at the first start is kept low by three ways to compile
 - ``inlined``: a large step of one kernel: part of it, not compiled on its own.
 
 Kernels assign numbers, never slices or rows (``a[i] = b[j]``): Numba compiles its messages on shapes for these.
+
+Machine code is kept where Numba keeps it (``NUMBA_CACHE_DIR``, beside the sources, or in the user's cache), else in a
+folder for temporary files, else not at all. A file that is damaged counts as missing: the kernel is compiled again.
 """
 
 from __future__ import annotations
 
+import logging
+import os
+import pickle
+import stat
+import tempfile
+import zlib
+from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 F = TypeVar("F")
 _KERNELS: list[Any] = []
+_LOG = logging.getLogger("imgquad_core")
+_CURE = "set NUMBA_CACHE_DIR to a folder that can be written, once"
 
 
 def kernel(function: F) -> F:
@@ -37,10 +51,11 @@ def inlined(function: F) -> F:
 
 
 def _compiled(function: F, **flags: Any) -> F:
-    flags |= {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    flags |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
     compiled: Any = numba.njit(**flags)(function)
     if not hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT: the function itself
         return compiled  # type: ignore[no-any-return]
+    _keep_on_disk(compiled)
     _ignore_literals(compiled)
     if flags.get("no_cpython_wrapper"):
         _keep_from_python(compiled)
@@ -66,6 +81,106 @@ def _keep_from_python(compiled: Any) -> None:
 
     compiled._compile_for_args = refuse
     compiled.add_overload = add_overload
+
+
+def _keep_on_disk(compiled: Any) -> None:
+    """Give a function the cache of its machine code; none where no folder can be written."""
+    try:
+        compiled._cache = _KernelCache(compiled.py_func)
+    except RuntimeError:  # Numba's "no locator available"
+        folder, asked = _temporary_folder(), numba.config.CACHE_DIR
+        if folder is None:
+            return
+        numba.config.CACHE_DIR = folder
+        try:
+            compiled._cache = _KernelCache(compiled.py_func)
+        finally:
+            numba.config.CACHE_DIR = asked
+
+
+@cache
+def _temporary_folder() -> str | None:
+    """Return a folder of this user alone among the temporary files, told of when it is new; None if there is none."""
+    try:
+        folder = Path(tempfile.gettempdir()) / f"imgquad-mesh-kernels-{getattr(os, 'getuid', int)()}"
+        is_new = not folder.exists()
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()  # code is loaded from there: nobody else may write into it
+        is_ours = stat.S_ISDIR(found.st_mode) and (not hasattr(os, "getuid") or found.st_uid == os.getuid())
+        if is_ours and not found.st_mode & 0o022 and os.access(folder, os.W_OK):
+            if is_new:
+                _LOG.warning("compiled kernels are kept in %s, as neither packages nor home can be written", folder)
+            return str(folder)
+    except OSError:
+        pass
+    _tell_that_none_is_kept("no folder for them can be written")
+    return None
+
+
+@cache
+def _tell_that_none_is_kept(reason: str) -> None:
+    _LOG.warning("compiled kernels are not kept, each start takes half a minute longer: %s; %s", reason, _CURE)
+
+
+class _KernelCache(FunctionCache):  # type: ignore[misc]
+    """Machine code on disk, whose absence or damage never stops a run."""
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _CheckedFiles(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what was kept, or None."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # whatever code raises that another state of the package has left
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep machine code where that can be done."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _tell_that_none_is_kept(f"{self._cache_path}: {error.strerror or error}")
+
+
+class _CheckedFiles(IndexDataCacheFile):  # type: ignore[misc]
+    """Numba's files, each of machine code with a checksum and its key; it is whole before the index names it."""
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep `data`."""
+        overloads = self._load_index()
+        names = (self._data_name(number) for number in count(1))
+        name = overloads.get(key) or next(name for name in names if name not in overloads.values())
+        self._save_data(name, (self._source_stamp, key, data))
+        if key not in overloads:
+            self._save_index({**overloads, key: name})
+
+    def load(self, key: Any) -> Any:
+        """Return what was kept under `key`, or None."""
+        stamp, kept_key, data = super().load(key) or (None, None, None)
+        return data if (stamp, kept_key) == (self._source_stamp, key) else None
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            overloads = super()._load_index()
+        except Exception:  # a cut or garbled file raises nearly anything
+            return {}
+        return overloads if isinstance(overloads, dict) else {}
+
+    def _save_data(self, name: str, data: Any) -> None:
+        packed = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(zlib.crc32(packed).to_bytes(4, "little"))
+            file.write(packed)
+
+    def _load_data(self, name: str) -> Any:
+        with open(self._data_path(name), "rb") as file:
+            checksum, packed = int.from_bytes(file.read(4), "little"), file.read()
+        if zlib.crc32(packed) != checksum:
+            raise OSError(f"{name} is damaged")
+        return pickle.loads(packed)
 
 
 def share_on_disk() -> float:

@@ -146,25 +146,30 @@ def _consistent(adjacency: Any, missing: Floats, target: Floats) -> Floats:
     return np.asarray(missing - spare[group] * share, np.float64)
 
 
+def _dot(a: Floats, b: Floats) -> float:
+    """Sum of products without BLAS, whose sums hang on its number of threads, which spin between two calls."""
+    return float(np.add.reduce(a * b))
+
+
 def _conjugate_gradients(matrix: Any, right: Floats) -> Floats:
     """Solve for the symmetric positive (semi)definite matrix, preconditioned by its diagonal."""
     diagonal = matrix.diagonal()
     solution, residual = np.zeros_like(right), right.copy()
     scaled = residual / diagonal
-    direction, rho = scaled.copy(), float(residual @ scaled)
+    direction, rho = scaled.copy(), _dot(residual, scaled)
     goal = 1e-5 * max(float(np.abs(right).max(initial=0.0)), 1e-12)
     for _ in range(1000):
         if np.abs(residual).max(initial=0.0) <= goal:
             break
         image = matrix @ direction
-        curvature = float(direction @ image)
-        if not curvature > 1e-12 * float(direction @ direction):
+        curvature = _dot(direction, image)
+        if not curvature > 1e-12 * _dot(direction, direction):
             break
         alpha = rho / curvature
         solution += alpha * direction
         residual -= alpha * image
         scaled = residual / diagonal
-        rho, previous = float(residual @ scaled), rho
+        rho, previous = _dot(residual, scaled), rho
         direction = scaled + (rho / previous) * direction
     return solution
 
