@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from imgquad_core.fe.femesh import FEMesh
-
-from .common import replacing
+from imgquad_core.whole_files import replacing
 
 
 def write_npz(mesh: FEMesh, path: str | Path) -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -17,39 +14,9 @@ from numpy.typing import ArrayLike
 
 from imgquad_core.errors import InputError
 from imgquad_core.fe.femesh import FEMesh, Names
+from imgquad_core.whole_files import replacing
 
 ROWS_AT_ONCE = 20_000
-BYTES_AT_ONCE = 1 << 20
-
-
-@contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
-    """Give a path in a new folder beside `path`, with the same name; move what was written there when all went well.
-
-    Raises
-    ------
-    InputError
-        Nothing can be written there, or the disk is full. What was at `path` before is still there.
-    """
-    target = Path(path)
-    try:
-        with tempfile.TemporaryDirectory(prefix=".imgquad-", dir=target.parent) as folder:
-            yield Path(folder) / target.name
-            for part in sorted(Path(folder).iterdir()):
-                os.replace(part, target.parent / part.name)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"cannot write {target}: {reason}; nothing was changed, choose another place") from error
-
-
-def take_room(folder: Path, n_bytes: int) -> None:
-    """Raise `OSError` if there is no room for `n_bytes` in `folder`, by writing as many.
-
-    For libraries that crash or keep silent where a disk fills up, as those that write HDF5 do.
-    """
-    with tempfile.TemporaryFile(dir=folder) as stream:
-        for start in range(0, n_bytes, BYTES_AT_ONCE):
-            stream.write(bytes(min(BYTES_AT_ONCE, n_bytes - start)))
 
 
 def write_text(path: str | Path, parts: Iterable[str]) -> None:

@@ -10,9 +10,11 @@ import numpy as np
 
 from imgquad_core.errors import InputError
 from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.whole_files import replacing, take_room
 
-from .common import points_3d, refuse_cohesive, refuse_six_nodes, replacing, take_room
+from .common import points_3d, refuse_cohesive, refuse_six_nodes
 from .gmsh import gmsh_text
+from .neighbours import is_of_xdmf
 
 OVERHEAD = 200_000  #: bytes of an HDF5 file besides the arrays, at most
 MOST_TIMES = 6  #: a universal file is this much longer than its .msh, at most
@@ -76,7 +78,8 @@ def write_xdmf(mesh: FEMesh, path: str | Path) -> None:
     Raises
     ------
     InputError
-        The Python packages meshio and h5py are not installed, or the mesh has cohesive elements.
+        The Python packages meshio and h5py are not installed, the mesh has cohesive elements, or ``NAME.h5`` is there
+        and was not written by this function.
     """
     meshio = _needed("meshio", ".xdmf")
     _needed("h5py", ".xdmf")
@@ -84,7 +87,7 @@ def write_xdmf(mesh: FEMesh, path: str | Path) -> None:
     points = points_3d(mesh) if mesh.dimension == 3 else mesh.points
     sides, numbers = _tagged_sides(mesh)
     arrays = (points, points, mesh.cells, mesh.cell_material, sides, numbers)
-    with replacing(path) as temporary:
+    with replacing(path, is_of_xdmf) as temporary:
         take_room(temporary.parent, sum(array.nbytes for array in arrays) + OVERHEAD)
         cells = [(MESHIO_KINDS[mesh.kind], mesh.cells)]
         meshio.write(temporary, meshio.Mesh(points, cells, cell_data={"material": [mesh.cell_material]}), "xdmf")

@@ -11,8 +11,9 @@ from scipy.io import netcdf_file, netcdf_variable
 
 from imgquad_core.arrays import Ints
 from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.whole_files import replacing
 
-from .common import refuse_six_nodes, replacing, safe_names
+from .common import refuse_six_nodes, safe_names
 
 NAME_LIMIT = 255
 ELEMENTS = {"tri3": "TRI3", "quad4": "QUAD4", "quad8": "QUAD8", "quad9": "QUAD9", "hex8": "HEX8"}

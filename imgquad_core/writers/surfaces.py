@@ -9,8 +9,9 @@ import numpy as np
 
 from imgquad_core.arrays import Bytes, Floats, Ints
 from imgquad_core.fe.femesh import FEMesh
+from imgquad_core.whole_files import replacing
 
-from .common import refuse_3d, refuse_cohesive, replacing, rows, safe_names, write_text
+from .common import refuse_3d, refuse_cohesive, rows, safe_names, write_text
 
 
 def write_obj(mesh: FEMesh, path: str | Path) -> None:

@@ -52,9 +52,9 @@ class Outputs:
     picture: Path | None = None
     script: Path | None = None
 
-    def check(self) -> None:
-        """Raise `InputError` if one of them could not be written, before any work is done."""
-        from imgquad_mesh.outputs.files import check_target, mesh_extensions
+    def check(self, *inputs: Path | None) -> None:
+        """Raise `InputError` if one of them could not be written or is one of `inputs`, before any work is done."""
+        from imgquad_mesh.outputs.files import check_files, check_target, mesh_extensions
 
         allowed = {
             "mesh": mesh_extensions(),
@@ -67,22 +67,22 @@ class Outputs:
         targets = {name: path for name in allowed if (path := getattr(self, name)) is not None}
         for name, path in targets.items():
             check_target(path, allowed[name])
-        if len({path.absolute() for path in targets.values()}) < len(targets):
-            raise InputError(f"two outputs have one name: {', '.join(map(str, targets.values()))}")
+        check_files(inputs, targets.values())
 
 
 @dataclass(frozen=True)
 class Writing:
-    """Which elements the mesh is made of, and the options of its writer."""
+    """Which elements the mesh is made of, the options of its writer, and the files that these were read from."""
 
     elements: ElementOptions | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
+    inputs: tuple[Path | None, ...] = ()
 
 
 def execute(args: argparse.Namespace) -> int:
     """Mesh the picture that `args` names; return the exit code."""
     outputs = Outputs(args.output, args.labels_out, args.boundaries_out, args.report, args.picture, args.save_script)
-    writing = Writing(element_options(args), writer_options(args))
+    writing = Writing(element_options(args), writer_options(args), (args.properties,))
     return mesh_to_files(
         args.image,
         mesh_options(args),
@@ -116,14 +116,15 @@ def mesh_to_files(
     """
     from imgquad_core.measures.quality import require_quality
     from imgquad_mesh.meshlab.catalogue import meshlab_filters
-    from imgquad_mesh.outputs.files import write_json
+    from imgquad_mesh.outputs import files
     from imgquad_mesh.outputs.report import build_report
     from imgquad_mesh.progress import progress_bar_if
 
     from .console import announce_compiling, print_report
 
     start = perf_counter()
-    outputs.check()
+    writing = writing or Writing()
+    outputs.check(image, *writing.inputs)
     if crosscheck:
         meshlab_filters()  # where pymeshlab is missing, that is said before any work is done
     if not quiet:
@@ -132,12 +133,11 @@ def mesh_to_files(
         run = _run(image, options, progress)
         wrote = perf_counter()
         progress("write", len(run.seconds), len(run.seconds) + 1)
-        _write(run, outputs, writing or Writing())
+        files.write_run(run, outputs.mesh, writing.elements, **writing.options)
     now = perf_counter()
     seconds = {**run.seconds, "write": now - wrote, "total": now - start}
     report = build_report(run, image, outputs.mesh, seconds, min_quality)
-    if outputs.report:
-        write_json(report, outputs.report)
+    _write_others(run, outputs, report)
     if not quiet:
         print_report(report)
     if crosscheck:
@@ -155,18 +155,23 @@ def _run(image: Path, options: MeshOptions, progress: Callable[[str, int, int], 
     return run(source, options, progress)
 
 
-def _write(run: Run, outputs: Outputs, writing: Writing) -> None:
+def _write_others(run: Run, outputs: Outputs, report: dict[str, Any]) -> None:
+    """Write all but the mesh, which is there whatever happens now: what is needed most first."""
     from imgquad_mesh.outputs import files
 
-    if outputs.labels:
-        files.write_labels(run.labels, outputs.labels)
-    if outputs.boundaries:
-        files.write_boundaries(run, outputs.boundaries)
-    if outputs.picture:
-        files.write_picture(run.mesh, outputs.picture)
-    if outputs.script:
-        _write_script(run.options, outputs.script)
-    files.write_run(run, outputs.mesh, writing.elements, **writing.options)
+    try:
+        if outputs.report:
+            files.write_json(report, outputs.report)
+        if outputs.picture:
+            files.write_picture(run.mesh, outputs.picture)
+        if outputs.labels:
+            files.write_labels(run.labels, outputs.labels)
+        if outputs.boundaries:
+            files.write_boundaries(run, outputs.boundaries)
+        if outputs.script:
+            _write_script(run.options, outputs.script)
+    except InputError as error:
+        raise InputError(f"{error} (the mesh is in {outputs.mesh})") from error
 
 
 def _write_script(options: MeshOptions, path: Path) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from imgquad_core.errors import InputError
+from imgquad_core.whole_files import replacing
 from imgquad_mesh.outputs.files import check_target, mesh_extensions, replace_file, write_mesh_file
 
 from .layer import Layer, surface, write_ply
@@ -53,17 +52,13 @@ def _all_quads(layer: Layer) -> bool:
 
 def _export(process: MeshLabProcess, path: Path) -> None:
     """Let MeshLab write into a folder beside `path` and move what it wrote (OBJ comes with a file of materials)."""
-    try:
-        with tempfile.TemporaryDirectory(prefix=".imgquad-", dir=path.parent) as folder:
-            process.export(Path(folder) / path.name)
-            for written in sorted(Path(folder).iterdir(), key=lambda file: file.name == path.name):
-                os.replace(written, path.parent / written.name)
-    except MeshLabError as error:
-        raise InputError(f"cannot write {path}: {error}; formats of MeshLab: .ply .obj .off .stl and more") from error
-    except OSError as error:
-        raise InputError(
-            f"cannot write {path}: {error.strerror or error}; give another folder or free some space"
-        ) from error
+    with replacing(path) as temporary:
+        try:
+            process.export(temporary)
+        except MeshLabError as error:
+            raise InputError(
+                f"cannot write {path}: {error}; formats of MeshLab: .ply .obj .off .stl and more"
+            ) from error
 
 
 def read_grid(path: Path) -> Layer:

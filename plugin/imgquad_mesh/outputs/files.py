@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from imgquad_core.errors import InputError
+from imgquad_core.whole_files import assert_apart, real_target, replacing, take_room
+from imgquad_core.writers.neighbours import check_neighbours, files_of
 
 if TYPE_CHECKING:
     from imgquad_core.fe.elements import ElementOptions
@@ -31,15 +32,21 @@ def check_target(path: Path, extensions: tuple[str, ...]) -> None:
     """Raise `InputError` now if `path` could not be written later."""
     if path.suffix.lower() not in extensions:
         raise InputError(f"{path}: cannot write '{path.suffix}' files here; the formats are {', '.join(extensions)}")
-    if path.is_dir():
-        raise InputError(f"{path} is a folder: give the name of a file")
-    if not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no folder {path.parent}; make it, or give another one")
     try:
-        with tempfile.TemporaryFile(dir=path.parent):
+        folder = real_target(path).parent
+        if not folder.is_dir():
+            raise InputError(f"cannot write {path}: there is no folder {folder}; make it, or give another one")
+        with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}; give another folder") from error
+        raise InputError(f"cannot write {path}: {error.strerror or error}; give another place") from error
+    check_neighbours(path)
+
+
+def check_files(inputs: Iterable[Path | None], outputs: Iterable[Path | None]) -> None:
+    """Raise `InputError` where an output, or a file that is written along with it, is an input or another output."""
+    written = [file for path in outputs if path is not None for file in files_of(path)]
+    assert_apart([path for path in inputs if path is not None], written)
 
 
 def mesh_extensions() -> tuple[str, ...]:
@@ -146,7 +153,8 @@ def write_picture(mesh: QuadMesh, path: Path) -> None:
 def write_json(values: dict[str, Any], path: Path) -> None:
     """Write `values` as JSON."""
     text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    data = text.encode("utf-8", "backslashreplace")  # names that are no UTF-8 become \\udcff, as JSON has them
+    replace_file(path, lambda temporary: temporary.write_bytes(data))
 
 
 def replace_file(path: Path, write: Callable[[Path], Any]) -> None:
@@ -157,14 +165,8 @@ def replace_file(path: Path, write: Callable[[Path], Any]) -> None:
     InputError
         It cannot be written or the disk is full: what was at `path` is untouched.
     """
-    try:
-        with tempfile.TemporaryDirectory(prefix=".imgquad-", dir=path.parent) as folder:
-            temporary = Path(folder) / path.name
-            write(temporary)
-            os.replace(temporary, path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"cannot write {path}: {reason}; what was there is unchanged, free some space") from error
+    with replacing(path) as temporary:
+        write(temporary)
 
 
 def save_dataset(dataset: Any, path: Path) -> None:
@@ -176,8 +178,6 @@ def save_dataset(dataset: Any, path: Path) -> None:
 
     writers = {".vtu": vtkXMLUnstructuredGridWriter, ".vtp": vtkXMLPolyDataWriter}
     if path.suffix.lower() == ".vtkhdf":
-        from imgquad_core.writers.common import take_room
-
         arrays = len(dataset.array_names) + 6  # with points, cells
         take_room(path.parent, 1024 * dataset.GetActualMemorySize() + 8 * HDF_CHUNK * arrays)
     if path.suffix.lower() not in writers:
