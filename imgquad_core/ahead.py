@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from functools import cache
 from pathlib import Path
 
@@ -31,9 +32,19 @@ def start() -> subprocess.Popen[bytes] | None:
     try:
         none = subprocess.DEVNULL
         command = [str(interpreter), "-P", "-m", WORK]  # -P: not the package of a clone that is the current folder
-        return subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=none)
+        return subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=none, stderr=none)
     except OSError:
         return None
+
+
+def end_with_the_first() -> None:
+    """In the second process: end as soon as the first one has, which holds the other end of standard input."""
+
+    def watch() -> None:
+        sys.stdin.buffer.read()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def wait() -> None:

@@ -36,4 +36,7 @@ def compile_last_stages() -> None:
 
 
 if __name__ == "__main__":
+    from imgquad_core.ahead import end_with_the_first
+
+    end_with_the_first()
     compile_last_stages()

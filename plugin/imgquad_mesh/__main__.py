@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Sequence
+from io import TextIOWrapper
 from typing import NoReturn
 
 from imgquad_core.errors import ImgquadError, InputError, QualityError
 
 from .cli import demo, list_filters, run, script
+from .cli.interruption import handling_signals
 
-GOOD, BUG, BAD_INPUT, LIMIT_NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
+GOOD, BUG, BAD_INPUT, LIMIT_NOT_MET = 0, 1, 2, 3
+BY_SIGNAL = 128  #: plus the number of the signal, as shells have it
 COMMANDS = (run, demo, script, list_filters)
 
 
@@ -39,21 +43,34 @@ def build_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names of files that the terminal cannot show
     args = build_parser().parse_args(argv)
-    try:
-        return int(args.execute(args))
-    except QualityError as error:
-        return _failed(error, LIMIT_NOT_MET)
-    except InputError as error:
-        return _failed(error, BAD_INPUT)
-    except ImgquadError as error:
-        return _failed(f"{error} (a bug of imgquad-mesh: please report it with the picture)", BUG)
-    except MemoryError:
-        return _failed("out of memory: crop the picture (--crop), or ask for larger elements (--size)", BAD_INPUT)
-    except BrokenPipeError:
-        return GOOD
-    except KeyboardInterrupt:
-        return _failed("interrupted", INTERRUPTED)
+    with handling_signals() as interruption:
+        try:
+            return int(args.execute(args))
+        except BrokenPipeError:
+            return GOOD
+        except Exception as error:
+            if interruption.signal is None:
+                return _failed(*_told(error))
+        except KeyboardInterrupt:
+            pass
+    return _failed("interrupted", BY_SIGNAL + (interruption.signal or signal.SIGINT))
+
+
+def _told(error: Exception) -> tuple[object, int]:
+    """Return what to say of an error, and the exit code; raise it where it is none of ours."""
+    if isinstance(error, QualityError):
+        return error, LIMIT_NOT_MET
+    if isinstance(error, InputError):
+        return error, BAD_INPUT
+    if isinstance(error, ImgquadError):
+        return f"{error} (a bug of imgquad-mesh: please report it with the picture)", BUG
+    if isinstance(error, MemoryError):
+        return "out of memory: crop the picture (--crop), or ask for larger elements (--size)", BAD_INPUT
+    raise error
 
 
 def _failed(reason: object, code: int) -> int:

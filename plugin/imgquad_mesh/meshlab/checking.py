@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -113,6 +113,15 @@ def checked_steps(script: Script, folder: Path) -> list[OwnStep | MeshLabStep]:
         else:
             steps.append(_meshlab_step(script, each, function, asked[function], folder))
     return steps
+
+
+def files_of_steps(steps: Iterable[OwnStep | MeshLabStep], folder: Path) -> tuple[list[Path], list[Path]]:
+    """Return the files that steps read and those that they write."""
+    of_meshlab = [parameter for step in steps if isinstance(step, MeshLabStep) for parameter in step.parameters]
+    read = [Path(str(value)) for _, kind, value in of_meshlab if kind == "RichOpenFile" and value]
+    written = [Path(str(value)) for _, kind, value in of_meshlab if kind == "RichSaveFile" and value]
+    names = [getattr(step.options, "file_name", None) for step in steps if isinstance(step, OwnStep)]
+    return read, written + [script_path(name, folder) for name in names if name]
 
 
 def _fail(script: Script, line: int, message: str) -> NoReturn:

@@ -6,10 +6,8 @@ never asked for: ``quads_number`` is 0 on every pure quad mesh, and its corner a
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +19,7 @@ from imgquad_core.errors import QualityError
 from imgquad_core.geometry.halfedge import components, twins_of
 from imgquad_core.measures.quality import corner_angles, material_areas, quad_areas, scaled_jacobian
 from imgquad_core.model import VOID, QuadMesh
+from imgquad_core.whole_files import scratch_folder
 
 from .meshsets import quad_layer
 from .process import MeshLabProcess
@@ -118,7 +117,7 @@ def crosscheck(mesh: QuadMesh, deadline: float = 120.0) -> CrossCheck:
 
 
 def _with_meshlab(mesh: QuadMesh, deadline: float) -> Iterator[Comparison]:
-    with tempfile.TemporaryDirectory(prefix="imgquad-") as folder, MeshLabProcess(Path(folder), deadline) as process:
+    with scratch_folder() as folder, MeshLabProcess(folder, deadline) as process:
         process.add(quad_layer(mesh))
         yield from _topology(mesh, process.apply("get_topological_measures"))
         yield from _shape(mesh, process.apply("get_topological_measures_from_quad_mesh"))

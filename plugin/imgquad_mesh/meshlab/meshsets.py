@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 from imgquad_core.errors import InputError
 from imgquad_core.model import Materials, QuadMesh
 from imgquad_core.tracing import trace_mesh
+from imgquad_core.whole_files import scratch_folder
 
 from .catalogue import MissingMeshLab
 from .layer import Layer, layer_of, surface
@@ -160,5 +159,5 @@ def add_to(meshset: Any, layer: Layer) -> int:
     """Put a layer into a MeshSet; it becomes the current one. Return its id."""
     from .worker import add_layer
 
-    with tempfile.TemporaryDirectory(prefix="imgquad-") as folder:
-        return add_layer(meshset, layer, Path(folder))
+    with scratch_folder() as folder:
+        return add_layer(meshset, layer, folder)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +13,10 @@ from typing import Any, TypeAlias
 
 from imgquad_core.errors import ImgquadError, InputError, ScriptError
 from imgquad_core.model import LabelImage, QuadMesh
-from imgquad_mesh.outputs.files import GRID_EXTENSIONS, replace_file
+from imgquad_core.whole_files import scratch_folder
+from imgquad_mesh.outputs.files import GRID_EXTENSIONS, check_files, replace_file
 
-from .checking import MeshLabStep, OwnStep, checked_steps
+from .checking import MeshLabStep, OwnStep, checked_steps, files_of_steps
 from .layer import Layer, layer_of, write_ply
 from .meshsets import add_to
 from .mlx import read_script
@@ -141,8 +142,11 @@ def run_script(
     target = Path(output) if output is not None else None
     if target is not None:
         check_saving(target)
+    read, written = files_of_steps(steps, base)
+    read += [Path(each) for each in (path, image, mesh) if isinstance(each, (str, Path))]
+    check_files(read, [target, *written])
     with ExitStack() as stack:
-        runner = _Runner(stack, State(LayerList(), image, base), deadline)
+        runner = _Runner(stack, State(LayerList(), image, base), deadline, read)
         runner.load(meshset, mesh)
         results = [runner.step(step, script.file, target) for step in _announced(steps, progress)]
         if target is not None:
@@ -163,8 +167,9 @@ def _announced(steps: list[OwnStep | MeshLabStep], progress: Progress | None) ->
 class _Runner:
     """Takes the steps one by one; starts MeshLab's process when it is first needed."""
 
-    def __init__(self, stack: ExitStack, state: State, deadline: float) -> None:
+    def __init__(self, stack: ExitStack, state: State, deadline: float, inputs: Iterable[Path] = ()) -> None:
         self._stack = stack
+        self._inputs = inputs
         self._deadline = deadline
         self.state = state
         self.process: MeshLabProcess | None = None
@@ -199,7 +204,7 @@ class _Runner:
 
     def _meshlab(self) -> MeshLabProcess:
         if self.process is None:
-            folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="imgquad-")))
+            folder = self._stack.enter_context(scratch_folder())
             self.process = self._stack.enter_context(MeshLabProcess(folder, self._deadline))
             self._move_layers(self.process)
         return self.process
@@ -225,6 +230,8 @@ class _Runner:
         path = beside.with_name(beside.stem + ".last_good.ply")
         if not os.access(path.parent, os.W_OK):
             path = Path(tempfile.gettempdir()) / path.name
+        if any(path.exists() and each.exists() and path.samefile(each) for each in self._inputs):
+            path = path.with_name(f"{beside.stem}.last_good_now.ply")  # the script went on from a last good mesh
         replace_file(path, lambda temporary: write_ply(layer, temporary))
         return path
 

@@ -9,13 +9,14 @@ import itertools
 import json
 import os
 import sys
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from imgquad_core.whole_files import scratch_folder
 
 from .layer import Layer, face_of_triangle, layer_of, load_layer, save_layer, write_ply
 
@@ -120,8 +121,8 @@ def _apply(
 
 
 def _apply_as_script(meshes: Any, script: str) -> None:
-    with tempfile.TemporaryDirectory(prefix="imgquad-") as folder:
-        path = Path(folder) / "one.mlx"
+    with scratch_folder() as folder:
+        path = folder / "one.mlx"
         path.write_text(script, encoding="utf-8")
         meshes.load_filter_script(str(path))
     meshes.apply_filter_script()

@@ -1,0 +1,57 @@
+"""Ctrl-C, SIGTERM and SIGHUP end the command in order: what was begun is cleaned up."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import monotonic
+from types import FrameType
+
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name))
+LATER = 0.05  #: seconds after which a signal that came during an import comes again
+AGAIN = 1.0  #: seconds in which further signals do not disturb the cleaning up
+
+
+class Interruption:
+    """Turns the first signal into a `KeyboardInterrupt`, once no import is under way."""
+
+    def __init__(self) -> None:
+        self.signal: int | None = None
+        self._raised = -AGAIN
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Note the signal and raise; libraries that load crash, or lose the exception, where it comes in between."""
+        self.signal = self.signal or number
+        if _is_importing(frame):
+            again = threading.Timer(LATER, signal.raise_signal, [number])
+            again.daemon = True
+            again.start()
+        elif monotonic() - self._raised >= AGAIN:
+            self._raised = monotonic()
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def handling_signals() -> Iterator[Interruption]:
+    """Handle the signals that end a process, but for those that are ignored (nohup) and off the main thread."""
+    interruption = Interruption()
+    former = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in SIGNALS:
+            if signal.getsignal(number) != signal.SIG_IGN:
+                former[number] = signal.signal(number, interruption.handle)
+    try:
+        yield interruption
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
