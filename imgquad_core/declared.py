@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from math import isfinite
 from numbers import Integral, Real
 from typing import Any
 
 from .errors import InputError
 
 _WHAT = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+LARGEST = 1e30  #: number that an option may have: its square is no infinity
 _TYPES: Mapping[type, type] = {bool: bool, str: str}
 
 
@@ -106,9 +106,11 @@ class Declaration:
             return self.kind is object
         if self.choices:
             return isinstance(value, (str, Integral)) and value in self.choices
-        return self.kind is object or (isinstance(value, Real) and isfinite(value) and self._holds(value))
+        return self.kind is object or (isinstance(value, Real) and self._holds(value))
 
     def _holds(self, number: Any) -> bool:
+        if not -LARGEST <= number <= LARGEST:
+            return False
         if self.kind is int and number != int(number):
             return False
         if self.above is not None and not number > self.above:

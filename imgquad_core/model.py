@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Bytes, Floats, Ints, Labels
+from .frozen import Value
 
 VOID = -1  #: label of a pixel, or region beside a chain, that is not meshed
 
@@ -36,7 +37,7 @@ def _frozen(values: ArrayLike, dtype: Any, ndim: int) -> NDArray[Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Materials:
+class Materials(Value):
     """What the picture called its materials.
 
     Parameters
@@ -73,7 +74,7 @@ class Materials:
 
 
 @dataclass(frozen=True, eq=False)
-class LabelImage:
+class LabelImage(Value):
     """A picture in which every pixel has one material.
 
     Parameters
@@ -97,7 +98,7 @@ class LabelImage:
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryGraph:
+class BoundaryGraph(Value):
     """Boundaries between all colours: chains of points from junction to junction.
 
     Parameters
@@ -163,7 +164,7 @@ class BoundaryGraph:
 
 
 @dataclass(frozen=True, eq=False)
-class QuadMesh:
+class QuadMesh(Value):
     """An all-quadrilateral mesh of several materials.
 
     Parameters

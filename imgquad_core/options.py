@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from numbers import Integral
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import picture
 from .boundary import ExtractionOptions, SmoothingOptions
 from .declared import check, option, same_as
 from .errors import InputError
+from .frozen import FrozenMapping
 from .mesher import EFFORTS, MeshingOptions
 from .picture import AbsorbOptions, DenoiseOptions, SegmentationOptions
 from .reading import Calibration, ReadOptions, asked_placement, assert_placement
@@ -104,11 +104,9 @@ class MeshOptions:
     size: float = same_as(SmoothingOptions, "size")
     boundary_size: float | None = same_as(SmoothingOptions, "boundary_size")
     frame_size: float | None = same_as(SmoothingOptions, "frame_size")
-    material_sizes: Mapping[str | int, float] = same_as(
-        SmoothingOptions, "material_sizes", default=MappingProxyType({})
-    )
+    material_sizes: Mapping[str | int, float] = same_as(SmoothingOptions, "material_sizes", default=FrozenMapping())
     sizes_between: Mapping[tuple[str | int, str | int], float] = same_as(
-        SmoothingOptions, "sizes_between", default=MappingProxyType({})
+        SmoothingOptions, "sizes_between", default=FrozenMapping()
     )
     growth: float = same_as(SmoothingOptions, "growth")
     colors: Any = same_as(SegmentationOptions, "colors")
@@ -184,10 +182,18 @@ class MeshOptions:
         assert_placement(self.pixel_size, self.origin)
         if self.crop is not None and not _is_box(self.crop):
             raise InputError(f"crop is {self.crop!r}; give left, upper, right and lower bound in whole pixels")
-        for name, listed in (("drop", self.drop), ("keep", self.keep)):
-            materials: object = listed
-            if isinstance(materials, str) or not isinstance(materials, Iterable):
-                raise InputError(f"{name} is {listed!r}; give a tuple of names or numbers of materials")
+        for name, made in (
+            ("material_sizes", FrozenMapping(self.material_sizes or {})),
+            ("sizes_between", FrozenMapping(self.sizes_between or {})),
+            ("drop", _materials("drop", self.drop)),
+            ("keep", _materials("keep", self.keep)),
+            ("colors", _hashable(self.colors)),
+            ("pixel_size", _hashable(self.pixel_size)),
+            ("origin", _hashable(self.origin)),
+            ("step", _hashable(self.step)),
+            ("crop", self.crop and tuple(map(int, self.crop))),
+        ):
+            object.__setattr__(self, name, made)
         if not all(isinstance(pair, tuple) and len(pair) == 2 for pair in self.sizes_between):
             raise InputError(f"sizes_between has {list(self.sizes_between)!r}; give pairs of materials, as (1, 2)")
         # each stage checks its own options: now, not after minutes of work
@@ -297,14 +303,29 @@ class MeshOptions:
 
     def _sizes(self, materials: Materials | None) -> dict[int, float]:
         if materials is None:  # only the values are checked
-            return dict(enumerate(self.material_sizes.values()))
+            return {}
         return picture.sizes_by_number(materials, self.material_sizes)
 
     def _sizes_between(self, materials: Materials | None) -> dict[tuple[int, int], float]:
         if materials is None:
-            return {(k, k + 1): size for k, size in enumerate(self.sizes_between.values())}
+            return {}
         return picture.sizes_by_numbers(materials, self.sizes_between)
 
 
 def _is_box(box: Any) -> bool:
     return isinstance(box, (tuple, list)) and len(box) == 4 and all(isinstance(bound, Integral) for bound in box)
+
+
+def _materials(name: str, given: object) -> tuple[Any, ...]:
+    """Return names or numbers of materials as a tuple; one may stand alone."""
+    made = (given,) if isinstance(given, (str, Integral)) else tuple(given) if isinstance(given, Iterable) else (None,)
+    if not all(isinstance(each, (str, Integral)) for each in made):
+        raise InputError(f"{name} is {given!r}; give names or numbers of materials")
+    return made
+
+
+def _hashable(given: Any) -> Any:
+    """Return rows as tuples; all else as it is, for its stage to check."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        return given
+    return tuple(map(_hashable, given))

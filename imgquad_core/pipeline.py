@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,6 +27,7 @@ from .boundary import (
     true_shape,
 )
 from .errors import InputError
+from .frozen import FrozenMapping
 from .geometry.corner_rule import corner_rule
 from .mesher import MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
@@ -175,8 +175,10 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
     progress : callable, optional
         Called as each stage starts.
     """
+    options = MeshOptions() if options is None else options
+    if not isinstance(options, MeshOptions):
+        raise InputError(f"options is {options!r}: give a MeshOptions")
     ahead.start()
-    options = options or MeshOptions()
     timed = _Stopwatch(progress)
     raw = source if isinstance(source, Segmentation) else _read(source, options, timed)
     found = raw if isinstance(raw, Segmentation) else _segmented(raw, options, timed)
@@ -217,7 +219,7 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
         square=true.square,
         pixel_mesh=mesh,
         mesh=_placed(mesh, true.square, options.corner),
-        seconds=MappingProxyType(timed.seconds),
+        seconds=FrozenMapping(timed.seconds),
         calibration=calibration,
         notes=notes,
     )
@@ -227,7 +229,16 @@ def read_source(source: Source, options: ReadOptions | None = None) -> Picture |
     """Return the picture that a path names or an array holds; a `Picture` or `LabelImage` as it is."""
     if isinstance(source, (str, Path)):
         return read_picture(source, options)
-    return source if isinstance(source, (LabelImage, Picture)) else picture_of(source)
+    if isinstance(source, (LabelImage, Picture)):
+        return source
+    if options is not None and options.frame is not None:
+        raise InputError(f"frame is {options.frame}, which is of files; give one picture, as stack[{options.frame}]")
+    try:
+        return picture_of(np.asanyarray(source))
+    except InputError:
+        raise
+    except ValueError as error:  # rows of different lengths
+        raise InputError(f"the picture is no array ({error}); give rows of one length") from error
 
 
 def segment_source(raw: Picture | LabelImage, options: SegmentationOptions | None = None) -> Segmentation:

@@ -65,6 +65,12 @@ class ElementOptions:
 
     def __post_init__(self) -> None:
         check(self)
+        if self.cohesive is not None and not isinstance(self.cohesive, str):
+            object.__setattr__(self, "cohesive", tuple(map(tuple, self.cohesive)))
+        if self.nodes == 9 and self.order == 1:
+            raise InputError("nodes 9 is of quads of order 2; ask for order 2, too")
+        if self.layers != 1 and self.extrude is None:
+            raise InputError(f"layers {self.layers} is of extruded meshes; say how thick, with extrude")
         if self.order == 2 and self.extrude is not None:
             raise InputError("order 2 and extrusion exclude each other: hexes have 8 nodes")
         if self.split_quads and (self.order == 2 or self.extrude is not None):

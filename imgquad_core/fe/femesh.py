@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imgquad_core.arrays import Bytes, Floats, Ints, Labels
+from imgquad_core.frozen import FrozenMapping, Value
 from imgquad_core.model import Materials
 
 
@@ -45,11 +46,11 @@ def _frozen(values: ArrayLike, dtype: Any) -> NDArray[Any]:
 
 
 def _frozen_sets(sets: Mapping[str, ArrayLike]) -> Mapping[str, Ints]:
-    return MappingProxyType({name: _frozen(ids, np.int64) for name, ids in sets.items()})
+    return FrozenMapping({name: _frozen(ids, np.int64) for name, ids in sets.items()})
 
 
 @dataclass(frozen=True, eq=False)
-class FEMesh:
+class FEMesh(Value):
     """Nodes, elements and named sets, ready for a solver.
 
     Parameters
