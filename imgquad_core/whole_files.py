@@ -54,7 +54,7 @@ def replacing(path: str | Path, is_ours: Callable[[Path], bool] | None = None) -
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
-            f"cannot write {path}: {reason}; what was there is unchanged, free some space or choose another place"
+            f"cannot write {path}: {reason}; nothing was changed, free some space or choose another place"
         ) from error
 
 

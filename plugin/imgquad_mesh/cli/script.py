@@ -44,6 +44,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--deadline", type=number, default=120.0, metavar="S", help="seconds for a filter of MeshLab (120)"
     )
+    parser.add_argument("--memory", type=number, metavar="GB", help="of MeshLab at most (half of the machine's)")
     parser.add_argument("--report", type=Path, metavar="FILE", help="what each filter returned: .json")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     parser.set_defaults(execute=execute)
@@ -52,10 +53,11 @@ def add_parser(subparsers: Any) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Run the script that `args` names; return the exit code."""
     from imgquad_mesh.meshlab.script import run_script
-    from imgquad_mesh.outputs.files import check_target, write_json
+    from imgquad_mesh.outputs.files import check_files, check_target, write_json
 
     if args.report:
         check_target(args.report, (".json",))
+        check_files([args.script, args.input], [args.output, args.report])
     is_mesh = args.input is not None and args.input.suffix.lower() in MESHES
     result = run_script(
         args.script,
@@ -64,6 +66,7 @@ def execute(args: argparse.Namespace) -> int:
         output=args.output,
         folder=args.folder,
         deadline=args.deadline,
+        memory=args.memory,
         progress=None if args.quiet or not sys.stderr.isatty() else _announce,
     )
     if args.report:

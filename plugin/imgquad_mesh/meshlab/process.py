@@ -13,20 +13,45 @@ import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from time import monotonic
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.errors import ImgquadError
+from imgquad_core.limits import check_real
 
 from .catalogue import meshlab_filters
 from .layer import Layer, load_layer, save_layer
+from .worker import MEMORY
 
 #: filters that leave points and faces as they are: nothing to save before the next one
 _HARMLESS = ("get_", "compute_selection", "compute_color", "compute_scalar", "compute_normal", "set_mesh")
 _STARTING = 120.0  #: seconds for the process to start and take the first layer, at least
-_MOVING = 20.0  #: seconds for taking a mesh out or putting one in, at least
+_MOVING = 20.0  #: seconds for taking a mesh out or putting one in where no filter has just run, at least
+_LONGEST = 1e8  #: seconds, three years: what a deadline of infinity means
+_SHARE = 0.5  #: of the machine's memory that the process may use where no limit is asked for
+_LEAST_MEMORY = 2.0  #: GB, below which pymeshlab itself cannot be relied on
+_OUT_OF_MEMORY = re.compile(r"bad_alloc|MemoryError|[Cc]annot allocate|out of memory|bad allocation")
+
+
+def memory_limit(asked: float | None) -> float:
+    """Return how many GB MeshLab's process may use.
+
+    Raises
+    ------
+    InputError
+        What was asked for is less than pymeshlab itself needs.
+    """
+    if asked is not None:
+        check_real("memory", asked, _LEAST_MEMORY, 1e6, "GB")
+        return float(asked)
+    try:
+        machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
+    except (AttributeError, ValueError, OSError):  # Windows
+        return 8.0
+    return max(_SHARE * machine, _LEAST_MEMORY)
 
 
 class MeshLabError(ImgquadError):
@@ -41,7 +66,9 @@ class MeshLabProcess:
     folder : Path
         A temporary folder for the files in which arrays travel.
     deadline : float
-        Seconds that one filter may take.
+        Seconds that one filter may take, with saving what it has made; infinity for no limit.
+    memory : float, optional
+        GB that the process may use; half of the machine's where not given. Not limited on Windows.
 
     Notes
     -----
@@ -49,10 +76,12 @@ class MeshLabProcess:
     current layer is put into a file, so that `last_good` is there when the next filter takes the process down.
     """
 
-    def __init__(self, folder: Path, deadline: float) -> None:
+    def __init__(self, folder: Path, deadline: float, memory: float | None = None) -> None:
         meshlab_filters()  # a pymeshlab that is missing or half loaded is named before anything runs
         self.folder = folder
-        self.deadline = deadline
+        self.deadline = min(deadline, _LONGEST)
+        self.memory = memory_limit(memory)
+        self._until: float | None = None  # when the filter that runs, and what is saved of it, must be done
         self._errors = (folder / "stderr.txt").open("wb")
         root = str(Path(__file__).resolve().parents[1])
         paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
@@ -61,7 +90,7 @@ class MeshLabProcess:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), MEMORY: str(int(self.memory * 1e9))},
             text=True,
             encoding="utf-8",
         )
@@ -105,9 +134,13 @@ class MeshLabProcess:
             ) from None
         except BrokenPipeError:
             answer = ""
+        if not answer and _OUT_OF_MEMORY.search(self._messages()):
+            raise MeshLabError(self._too_large())
         if not answer:
             raise MeshLabError(f"ended the MeshLab process ({self._exit_reason()}); leave the filter out")
         content = json.loads(answer)
+        if "error" in content and _OUT_OF_MEMORY.search(content["error"]):
+            raise MeshLabError(self._too_large())
         if "error" in content:
             raise MeshLabError(" ".join(content["error"].split()))
         return content["values"]
@@ -116,7 +149,12 @@ class MeshLabProcess:
         if not self._started:
             self._started = True
             return max(self.deadline, _STARTING)
-        return self.deadline if do == "apply" else max(self.deadline, _MOVING)
+        if self._until is not None:
+            return max(self._until - monotonic(), 0.0)
+        return max(self.deadline, _MOVING)
+
+    def _too_large(self) -> str:
+        return f"needed more than {self.memory:.3g} GB and was stopped; allow more memory, or leave the filter out"
 
     def _exit_reason(self) -> str:
         code = self._process.wait()
@@ -158,6 +196,15 @@ class MeshLabProcess:
             A script of this filter alone, with MeshLab's names: run where pymeshlab would clamp a value.
         """
         printed = self._messages()
+        self._until = monotonic() + self.deadline
+        try:
+            return self._applied(function, parameters, script, printed)
+        finally:
+            self._until = None
+
+    def _applied(
+        self, function: str, parameters: Sequence[tuple[str, str, Any]], script: str | None, printed: str
+    ) -> dict[str, Any]:
         answer = self.ask("apply", function=function, parameters=list(parameters), script=script)
         ignored = re.search(r"parameter (\S+) not required", self._messages()[len(printed) :])
         if answer.get("by_script") and ignored:

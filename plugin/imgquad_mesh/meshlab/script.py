@@ -7,11 +7,13 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeAlias
 
 from imgquad_core.errors import ImgquadError, InputError, ScriptError
+from imgquad_core.limits import check_real
 from imgquad_core.model import LabelImage, QuadMesh
 from imgquad_core.whole_files import scratch_folder
 from imgquad_mesh.outputs.files import GRID_EXTENSIONS, check_files, replace_file
@@ -20,7 +22,7 @@ from .checking import MeshLabStep, OwnStep, checked_steps, files_of_steps
 from .layer import Layer, layer_of, write_ply
 from .meshsets import add_to
 from .mlx import read_script
-from .process import MeshLabError, MeshLabProcess
+from .process import MeshLabError, MeshLabProcess, memory_limit
 from .saving import check_saving, read_grid, save_current
 from .state import LayerList, State
 from .steps import STEPS
@@ -92,6 +94,7 @@ def run_script(
     output: str | Path | None = None,
     folder: str | Path | None = None,
     deadline: float = 120.0,
+    memory: float | None = None,
     progress: Progress | None = None,
 ) -> ScriptResult:
     """Run a filter script.
@@ -112,7 +115,9 @@ def run_script(
     folder : path-like, optional
         Files that the script names must lie in it, and relative ones are taken from it; the script's own by default.
     deadline : float
-        Seconds that one filter of MeshLab may take.
+        Seconds that one filter of MeshLab may take; infinity for no limit.
+    memory : float, optional
+        GB that MeshLab may use, at least 2; half of the machine's by default.
     progress : callable, optional
         Called with the name of each filter that starts, its number from 0, and the number of filters.
 
@@ -135,8 +140,8 @@ def run_script(
     pymeshlab.
     """
     script = read_script(path)
-    if not deadline > 0:
-        raise InputError(f"deadline is {deadline:g}; give a number of seconds above 0")
+    check_real("deadline", deadline, 1e-3, inf, "s")
+    memory = memory_limit(memory)
     base = Path(folder) if folder is not None else Path(path).resolve().parent
     steps = checked_steps(script, base)
     target = Path(output) if output is not None else None
@@ -146,7 +151,7 @@ def run_script(
     read += [Path(each) for each in (path, image, mesh) if isinstance(each, (str, Path))]
     check_files(read, [target, *written])
     with ExitStack() as stack:
-        runner = _Runner(stack, State(LayerList(), image, base), deadline, read)
+        runner = _Runner(stack, State(LayerList(), image, base), deadline, memory, read)
         runner.load(meshset, mesh)
         results = [runner.step(step, script.file, target) for step in _announced(steps, progress)]
         if target is not None:
@@ -167,10 +172,11 @@ def _announced(steps: list[OwnStep | MeshLabStep], progress: Progress | None) ->
 class _Runner:
     """Takes the steps one by one; starts MeshLab's process when it is first needed."""
 
-    def __init__(self, stack: ExitStack, state: State, deadline: float, inputs: Iterable[Path] = ()) -> None:
+    def __init__(self, stack: ExitStack, state: State, deadline: float, memory: float, inputs: Iterable[Path]) -> None:
         self._stack = stack
         self._inputs = inputs
         self._deadline = deadline
+        self._memory = memory
         self.state = state
         self.process: MeshLabProcess | None = None
 
@@ -205,7 +211,7 @@ class _Runner:
     def _meshlab(self) -> MeshLabProcess:
         if self.process is None:
             folder = self._stack.enter_context(scratch_folder())
-            self.process = self._stack.enter_context(MeshLabProcess(folder, self._deadline))
+            self.process = self._stack.enter_context(MeshLabProcess(folder, self._deadline, self._memory))
             self._move_layers(self.process)
         return self.process
 

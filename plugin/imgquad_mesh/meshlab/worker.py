@@ -10,6 +10,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,12 @@ from .layer import Layer, face_of_triangle, layer_of, load_layer, save_layer, wr
 Array = NDArray[Any]
 
 
+MEMORY = "IMGQUAD_MESHLAB_BYTES"  #: environment variable with the bytes that the process may use
+
+
 def main() -> None:
     """Answer requests until the input ends."""
+    _limit_memory(int(os.environ.get(MEMORY, "0")))
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what pymeshlab prints must not get between the answers
     import pymeshlab
@@ -38,6 +43,18 @@ def main() -> None:
             answer = {"error": f"{type(error).__name__}: {error}"}
         answers.write(json.dumps(answer, default=plain) + "\n")
         answers.flush()
+
+
+def _limit_memory(n_bytes: int) -> None:
+    """Have what needs more fail here, before the machine swaps or ends other processes."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    if n_bytes and (hard == resource.RLIM_INFINITY or n_bytes < hard):
+        with suppress(ValueError, OSError):  # macOS refuses some
+            resource.setrlimit(resource.RLIMIT_AS, (n_bytes, hard))
 
 
 def plain(value: Any) -> Any:
