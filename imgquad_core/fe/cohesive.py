@@ -5,6 +5,14 @@
         B              3---4         4, 3 are copies of 1, 2 at the same places: the element has no
     ---p---q---  ->    1   2  with   thickness. Its first side lies on A (the lower material), its
         A              -------       normal points from A to B.
+
+In a periodic cell the seam is whole: elements on its two sides count as neighbours that nothing cuts, so copies of a
+node on one side are tied to the copies of its partner on the other::
+
+    right   |   left       A crack between A and B that goes on across the seam has two nodes on either side: a tied
+     A  b'  |  b  A        to a', b to b'. Where it ends at the seam, as the picture does not go on there, it ends
+    ----    |    ----      closed as inside a material: one node.
+     B  a'  |  a  B
 """
 
 from __future__ import annotations
@@ -28,7 +36,7 @@ def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all
     Parameters
     ----------
     mesh : FEMesh
-        Plane, of quads with 4, 8 or 9 nodes, not split before.
+        Plane, of quads with 4, 8 or 9 nodes, not split before; a periodic one with its pairs.
     pairs : ``all`` or pairs of material names
         Between which materials. A name twice: between all elements of this material.
 
@@ -40,7 +48,7 @@ def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all
         middles of (1, 2) and (4, 3). A node is copied once for each group of elements around it that no cut parts;
         the group with the lowest element keeps the number. So at a junction of three cut interfaces there are three
         nodes, and where a cut ends inside a material both ends of an element are the same node. The node set of a
-        side set has the nodes of that side; `interface_B_A` gets one of its own.
+        side set has the nodes of that side; `interface_B_A` gets one of its own. `periodic` has the pairs of copies.
 
     Raises
     ------
@@ -52,7 +60,8 @@ def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all
             "cohesive elements are put into a plane mesh once: split before extruding, all pairs at a time"
         )
     lower, upper = _cut_half_edges(mesh, _chosen(mesh, pairs))
-    cells, origin = _split_nodes(mesh, np.concatenate([lower, upper]), upper)
+    group = _groups_of_corners(mesh, np.concatenate([lower, upper]))
+    cells, origin = _split_nodes(mesh, group, np.concatenate([lower, upper]), upper)
     halves = replace(
         mesh,
         points=mesh.points[origin],
@@ -60,6 +69,7 @@ def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all
         point_kind=mesh.point_kind[origin],
         chain_offsets=np.zeros(1, np.int64),
         chain_points=np.empty(0, np.int64),
+        periodic={d: _paired_copies(mesh, pairs, group, cells) for d, pairs in mesh.periodic.items()},
     )
     below, above = (halves.side_nodes(np.stack([h // 4, h % 4], axis=1)) for h in (lower, upper))
     # each side runs counter-clockwise around its own element, so the two run against each other
@@ -79,6 +89,14 @@ def open_interfaces(mesh: FEMesh) -> FEMesh:
     So any format and any order can hold it; for contact, and for solvers that put cohesive laws between sides.
     """
     return replace(mesh, cohesive=np.empty((0, 4), np.int64), cohesive_pair=np.empty((0, 2), np.int32))
+
+
+def closed_ends(mesh: FEMesh) -> int:
+    """Return how many interfaces end closed at the seam of a periodic cell: there the picture does not go on."""
+    tied = np.unique(np.concatenate([np.empty(0, np.int64), *(pairs.ravel() for pairs in mesh.periodic.values())]))
+    ends = mesh.cohesive[:, [[0, 3], [1, 2]]].reshape(-1, 2)  # both nodes at either end of each element
+    closed = np.unique(ends[ends[:, 0] == ends[:, 1], 0])
+    return int(np.isin(closed, tied).sum())
 
 
 def _chosen(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]]) -> list[tuple[int, int]]:
@@ -124,14 +142,15 @@ def _cut_half_edges(mesh: FEMesh, chosen: list[tuple[int, int]]) -> tuple[Ints, 
     return lower, twin[lower]
 
 
-def _split_nodes(mesh: FEMesh, cut: Ints, upper: Ints) -> tuple[Ints, Ints]:
+def _split_nodes(mesh: FEMesh, group: Ints, cut: Ints, upper: Ints) -> tuple[Ints, Ints]:
     """Nodes of the elements after splitting along the half-edges `cut`, and the old node of each new one.
 
-    Corners of elements around a node belong together where the elements share an edge that is not cut. The middle of
-    a cut edge is copied for the `upper` side.
+    Corners of elements around a node stay together where they are of one group. The middle of a cut edge is copied
+    for the `upper` side.
     """
     corners = mesh.cells[:, :4].ravel()
-    group = _groups_of_corners(mesh, cut)
+    # across the seam of a periodic cell a group has several nodes
+    group = np.unique(group * mesh.n_points + corners, return_inverse=True)[1].ravel()
     first = np.full(group.max() + 1, len(group))
     np.minimum.at(first, group, np.arange(len(group)))  # first corner of each group
     is_cut = np.zeros(mesh.n_points, bool)
@@ -153,15 +172,63 @@ def _split_nodes(mesh: FEMesh, cut: Ints, upper: Ints) -> tuple[Ints, Ints]:
 
 
 def _groups_of_corners(mesh: FEMesh, cut: Ints) -> Ints:
-    """Return the group of each corner ``4 cell + k`` of the elements."""
+    """Return the group of each corner ``4 cell + k`` of the elements.
+
+    Corners around a node are of one group where their elements share an edge that is not cut, or the seam.
+    """
     n = 4 * mesh.n_cells
     twin = half_edge_twins(mesh.cells[:, :4], mesh.n_points)
     twin[cut] = -1
     tail = np.flatnonzero(twin >= 0)
     head_of_twin = twin[tail] // 4 * 4 + (twin[tail] + 1) % 4
-    graph = coo_array((np.ones(len(tail), np.int8), (tail, head_of_twin)), shape=(n, n))
+    seam = [_corners_across(mesh, pairs) for pairs in mesh.periodic.values()]
+    rows, columns = np.concatenate([np.stack([tail, head_of_twin]), *seam], axis=1)
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
     group: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
     return group
+
+
+def _corners_across(mesh: FEMesh, pairs: Ints) -> Ints:
+    """Return pairs of corners that face each other across the seam, shape (2, n): both ends of each edge on it.
+
+    ::
+
+        -q'  |  q-      the edge (p', q') of an element on the one side is (q, p) of an element on the other
+             |
+        -p'  |  p-
+    """
+    partner = np.full(mesh.n_points, -1)
+    partner[pairs[:, 0]] = pairs[:, 1]
+    tails = mesh.cells[:, :4].ravel()
+    heads = np.roll(mesh.cells[:, :4], -1, axis=1).ravel()
+    next_corner = np.arange(len(tails)) // 4 * 4 + (np.arange(len(tails)) + 1) % 4
+    outer = np.flatnonzero(half_edge_twins(mesh.cells[:, :4], mesh.n_points) < 0)
+    near = outer[(partner[tails[outer]] >= 0) & (partner[heads[outer]] >= 0)]
+    key = heads[outer] * mesh.n_points + tails[outer]
+    order = np.argsort(key)
+    wanted = partner[tails[near]] * mesh.n_points + partner[heads[near]]
+    at = np.searchsorted(key[order], wanted).clip(max=len(key) - 1)
+    facing = key[order][at] == wanted
+    near, far = near[facing], outer[order][at][facing]
+    return np.stack([np.concatenate([near, next_corner[near]]), np.concatenate([next_corner[far], far])])
+
+
+def _paired_copies(mesh: FEMesh, pairs: Ints, group: Ints, cells: Ints) -> Ints:
+    """Return the pairs of copies of paired nodes: those whose corners are of one group; middles have no copies."""
+    n, corners = mesh.n_points, mesh.cells[:, :4].ravel()
+    key, first = np.unique(group * n + corners, return_index=True)  # each copy once
+    copy = cells[:, :4].ravel()[first]
+    place, partner = np.full(n, -1), np.full(n, -1)
+    place[pairs[:, 0]], partner[pairs[:, 0]] = np.arange(len(pairs)), pairs[:, 1]
+    master = np.flatnonzero(place[key % n] >= 0)
+    wanted = key[master] // n * n + partner[key[master] % n]
+    slave = np.searchsorted(key, wanted).clip(max=len(key) - 1)
+    found = key[slave] == wanted
+    copies = np.stack([copy[master], copy[slave]], axis=1)[found]
+    middles = np.flatnonzero(~np.isin(pairs[:, 0], corners))
+    order = np.concatenate([place[key[master] % n][found], middles])
+    both: Ints = np.concatenate([copies, pairs[middles]])
+    return np.asarray(both[np.lexsort((both[:, 0], order))])
 
 
 def _node_sets(mesh: FEMesh, origin: Ints) -> dict[str, Ints]:

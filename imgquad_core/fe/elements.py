@@ -97,10 +97,10 @@ def make_elements(mesh: QuadMesh, options: ElementOptions) -> FEMesh:
     elements = fe_mesh(mesh)
     if options.order == 2:
         elements = second_order(elements, options.nodes)
+    if options.periodic is not None:  # before splitting, which hands the pairs down to the copies
+        elements = with_periodic_pairs(elements, options.periodic)
     if options.cohesive is not None:
         elements = split_interfaces(elements, options.cohesive)
-    if options.periodic is not None:
-        elements = with_periodic_pairs(elements, options.periodic)
     if options.extrude is not None:
         elements = extrude(elements, options.extrude, options.layers)
     if options.split_quads:

@@ -20,7 +20,7 @@ def with_periodic_pairs(mesh: FEMesh, directions: str) -> FEMesh:
     Parameters
     ----------
     mesh : FEMesh
-        Plane, of a boundary that `match_opposite_sides` has matched.
+        Plane, of a boundary that `match_opposite_sides` has matched; its interfaces not split yet.
     directions : str
         ``x``, ``y`` or ``xy``.
 
@@ -32,7 +32,7 @@ def with_periodic_pairs(mesh: FEMesh, directions: str) -> FEMesh:
     Raises
     ------
     InputError
-        Unknown directions, or a side without elements.
+        Unknown directions, a side without elements, none that face each other, or a mesh that is split already.
     TopologyError
         Nodes of opposite sides do not match.
     """
@@ -42,21 +42,22 @@ def with_periodic_pairs(mesh: FEMesh, directions: str) -> FEMesh:
 
 
 def _node_pairs(mesh: FEMesh, low: str, high: str, along: int) -> Ints:
+    if len(mesh.cohesive):
+        raise InputError("periodic: the interfaces are split already; pair the sides first, then split")
     for name in (low, high):
         if name not in mesh.node_sets:
             raise InputError(f"periodic: no element lies on the {name} border; nothing can be tied to it")
     near = 1e-9 * float(np.ptp(mesh.points, axis=0).max())
     a, b = (_sorted_along(mesh, mesh.node_sets[name], along, near) for name in (low, high))
     if not any(name.startswith("free_") for name in mesh.side_sets):
-        if len(a) != len(b) and len(mesh.cohesive):
-            raise InputError(
-                f"periodic: {len(a)} nodes on the {low} border, {len(b)} on the {high} border: split interfaces meet "
-                "them at different places; leave out the cohesive elements, or use a picture that repeats itself"
-            )
         if len(a) != len(b):
             raise TopologyError(f"periodic: {len(a)} nodes on the {low} border, {len(b)} on the {high} border")
     else:
         a, b = _common(mesh, a, b, along, near)
+    if not len(a):
+        raise InputError(
+            f"periodic: no element of the {low} border faces one of the {high} border: nothing can be tied; drop less"
+        )
     off = np.abs(mesh.points[a, along] - mesh.points[b, along])
     if (off > near).any():
         raise TopologyError(f"periodic: {(off > near).sum()} nodes of the {low} border have no partner on the {high}")
@@ -64,13 +65,8 @@ def _node_pairs(mesh: FEMesh, low: str, high: str, along: int) -> Ints:
 
 
 def _sorted_along(mesh: FEMesh, ids: Ints, along: int, near: float) -> Ints:
-    """Nodes in order along a side; copies of a split node by the places of their elements."""
-    at = np.round(mesh.points[ids, along] / near)
-    total, count = np.zeros(mesh.n_points), np.zeros(mesh.n_points)
-    centre = mesh.points[mesh.cells].mean(axis=1)[:, along]
-    np.add.at(total, mesh.cells, centre[:, None])
-    np.add.at(count, mesh.cells, 1)
-    ordered: Ints = ids[np.lexsort((total[ids] / np.maximum(count[ids], 1), at))]
+    """Nodes in order along a side."""
+    ordered: Ints = ids[np.argsort(np.round(mesh.points[ids, along] / near), kind="stable")]
     return ordered
 
 

@@ -8,6 +8,7 @@ from math import isfinite
 from numbers import Real
 from typing import Any, TypeAlias
 
+from imgquad_core.declared import LARGEST
 from imgquad_core.errors import InputError
 
 Box = tuple[int, int, int, int]
@@ -135,7 +136,7 @@ def assert_placement(size: Size, origin: tuple[float, float] | str) -> None:
         word, colon, unit = size.partition(":")
         if word not in ("auto", "file") or (colon and (word == "auto" or unit_name(unit) is None)):
             raise InputError(f"pixel_size is '{size}'; give a length, auto, file, or file:UNIT as in file:mm")
-    elif not all(_is_number(side) and side > 0 for side in _parts(size)):
+    elif not all(_is_number(side) and 1 / LARGEST <= side <= LARGEST for side in _parts(size)):
         raise InputError(f"pixel_size is {size!r}; give a length above 0, or a width and a height")
     if isinstance(origin, str):
         if origin not in ("auto", "file"):

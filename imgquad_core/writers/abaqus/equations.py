@@ -37,28 +37,38 @@ def equation_text(mesh: FEMesh, heat: bool) -> Iterator[str]:
     far = mesh.points.max(axis=0)
     for direction, number in drivers.items():
         yield f"*NODE, NSET={driver_names(mesh)[direction]}\n{number}, " + ", ".join(map(real, far)) + "\n"
-    for slave, (master, directions) in sorted(_ties(mesh).items()):
-        terms = [slave + 1, master + 1, *(drivers[d] for d in directions)]
+    for slave, (master, steps) in sorted(_ties(mesh).items()):
+        terms = {slave + 1: 1, master + 1: -1} | {drivers[d]: -n for d, n in steps.items() if n}
         for dof in (TEMPERATURE,) if heat else range(1, mesh.dimension + 1):
-            factors = ["1.", *["-1."] * (len(terms) - 1)]
-            items = [f"{node}, {dof}, {factor}" for node, factor in zip(terms, factors, strict=True)]
+            items = [f"{node}, {dof}, {factor}." for node, factor in terms.items()]
             yield f"*EQUATION\n{len(terms)}\n" + ", ".join(items) + "\n"
 
 
-def _ties(mesh: FEMesh) -> dict[int, tuple[int, str]]:
-    """Master of each slave, and the directions between them; masters are no slaves."""
-    masters = {
-        d: dict(zip(pairs[:, 1].tolist(), pairs[:, 0].tolist(), strict=True)) for d, pairs in mesh.periodic.items()
-    }
-    ties: dict[int, tuple[int, str]] = {}
-    for direction, of in masters.items():
-        for slave in of:
-            node, path = slave, ""
-            for step in (direction, *(d for d in masters if d != direction)):
-                if node in masters[step]:
-                    node, path = masters[step][node], path + step
-            ties.setdefault(slave, (node, path))
-    return ties
+def _ties(mesh: FEMesh) -> dict[int, tuple[int, dict[str, int]]]:
+    """Master of each slave, and how often each direction leads from it to the slave; masters are no slaves.
+
+    Of nodes that are tied to one another, the leftmost and lowest is the master. At corners where interfaces were
+    split it may be at the upper left: then the lower right corner is one step right and one back down from there.
+    """
+    beside: dict[int, list[tuple[int, str, int]]] = {}
+    for direction, pairs in mesh.periodic.items():
+        for master, slave in pairs.tolist():
+            beside.setdefault(master, []).append((slave, direction, 1))
+            beside.setdefault(slave, []).append((master, direction, -1))
+    steps: dict[int, tuple[int, dict[str, int]]] = {}
+    for master in sorted(beside, key=lambda node: (*mesh.points[node].tolist(), node)):
+        if master in steps:
+            continue
+        steps[master] = master, dict.fromkeys(mesh.periodic, 0)
+        waiting = [master]
+        while waiting:
+            node = waiting.pop()
+            for other, direction, step in beside[node]:
+                if other not in steps:
+                    way = steps[node][1]
+                    steps[other] = master, way | {direction: way[direction] + step}
+                    waiting.append(other)
+    return {node: tie for node, tie in steps.items() if node != tie[0]}
 
 
 def periodic_deck(mesh: FEMesh, deck: str, nodes: Mapping[str, str]) -> Iterator[str]:

@@ -117,7 +117,7 @@ def mesh_to_files(
     from imgquad_core.measures.quality import require_quality
     from imgquad_mesh.meshlab.catalogue import meshlab_filters
     from imgquad_mesh.outputs import files
-    from imgquad_mesh.outputs.report import build_report
+    from imgquad_mesh.outputs.report import build_report, element_notes
     from imgquad_mesh.progress import progress_bar_if
 
     from .console import announce_compiling, print_report
@@ -133,10 +133,11 @@ def mesh_to_files(
         run = _run(image, options, progress)
         wrote = perf_counter()
         progress("write", len(run.seconds), len(run.seconds) + 1)
-        files.write_run(run, outputs.mesh, writing.elements, **writing.options)
+        made = files.write_run(run, outputs.mesh, writing.elements, **writing.options)
     now = perf_counter()
     seconds = {**run.seconds, "write": now - wrote, "total": now - start}
     report = build_report(run, image, outputs.mesh, seconds, min_quality)
+    report["notes"] += element_notes(made)
     _write_others(run, outputs, report)
     if not quiet:
         print_report(report)

@@ -56,7 +56,7 @@ def mesh_extensions() -> tuple[str, ...]:
     return (*GRID_EXTENSIONS, *sorted(WRITERS))
 
 
-def write_run(run: Run, path: Path, elements: ElementOptions | None = None, **options: Any) -> None:
+def write_run(run: Run, path: Path, elements: ElementOptions | None = None, **options: Any) -> FEMesh | None:
     """Write the mesh of a run as `write_mesh_file` does; VTK's formats also hold pixel size, place and CRS."""
 
     def add_place(grid: Any) -> None:
@@ -64,7 +64,7 @@ def write_run(run: Run, path: Path, elements: ElementOptions | None = None, **op
 
         put_calibration(grid, run.calibration, (run.options.pixel_sides, run.options.corner))
 
-    write_mesh_file(run.mesh, path, elements, add_place, **options)
+    return write_mesh_file(run.mesh, path, elements, add_place, **options)
 
 
 def write_mesh_file(
@@ -73,10 +73,15 @@ def write_mesh_file(
     elements: ElementOptions | None = None,
     complete: Callable[[Any], None] | None = None,
     **options: Any,
-) -> None:
+) -> FEMesh | None:
     """Write `mesh`, as the `elements` asked for, in the format that the extension of `path` names.
 
     `complete` adds to the grid that VTK writes.
+
+    Returns
+    -------
+    FEMesh or None
+        The elements where others than the quads of the mesh were asked for.
     """
     from imgquad_core.fe import fe_mesh, make_elements
 
@@ -94,6 +99,7 @@ def write_mesh_file(
         from imgquad_core.writers import write_mesh
 
         write_mesh(made or mesh, path, **options)
+    return made
 
 
 def _write_plain(mesh: FEMesh, path: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.fe.cohesive import closed_ends
 from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.measures.quality import bad_places, forced_quads, quality_report, scaled_jacobian
 from imgquad_core.mesher import triangulator_used
@@ -21,6 +22,7 @@ from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.pipeline import lost_materials, thin_features
 
 if TYPE_CHECKING:
+    from imgquad_core.fe.femesh import FEMesh
     from imgquad_core.pipeline import Run
 
 PACKAGES = ("imgquad-mesh", "numpy", "scipy", "numba", "scikit-image", "triangle", "pythoncdt", "pyvista", "vtk")
@@ -93,6 +95,13 @@ def _moved(run: Run) -> float:
     before, after = extract_boundaries(run.clean), run.boundary
     to_pixels = np.array(run.clean.shape[::-1]) / np.array(after.shape[::-1])
     return float(cKDTree(before.points).query(after.points * to_pixels)[0].max())
+
+
+def element_notes(made: FEMesh | None) -> list[str]:
+    """Say in words what became otherwise than the elements asked for."""
+    closed = closed_ends(made) if made is not None and made.periodic and len(made.cohesive) else 0
+    text = f"{closed} ends of cohesive interfaces at the border are closed, as the picture does not go on there"
+    return [f"{text}: its opposite sides differ"] if closed else []
 
 
 def versions() -> dict[str, str]:
