@@ -72,8 +72,8 @@ def _bulges(mesh: FEMesh, edges: Ints) -> Floats:
     if len(segments):
         before, after = _neighbours(mesh)
         off = _curve_middles(mesh.points, segments, before, after) - mesh.points[segments].mean(axis=1)
-        key = np.sort(segments, axis=1) @ [mesh.n_points, 1]
-        bulge[np.searchsorted(edges @ [mesh.n_points, 1], key)] = off
+        key, wanted = (pairs[:, 0] * mesh.n_points + pairs[:, 1] for pairs in (edges, np.sort(segments, axis=1)))
+        bulge[np.searchsorted(key, wanted)] = off
     return bulge
 
 

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.errors import QualityError
 from imgquad_core.geometry.halfedge import twins_of
+from imgquad_core.limits import check_real
 from imgquad_core.model import QuadMesh
 
 GOOD_ANGLES = (45.0, 135.0)  #: range of a corner's angle, in degrees, that Verdict calls acceptable
@@ -228,6 +229,7 @@ def require_quality(mesh: QuadMesh, limit: float, most: int = 5) -> None:
 
     The message says how many quads are, how many of them the picture forces, and names at most `most` of the worst.
     """
+    check_real("min_quality", limit, -1.0, 1.0)
     below = scaled_jacobian(mesh.points, mesh.quads) < limit
     if not below.any():
         return

@@ -136,7 +136,8 @@ def _extended(points: Floats, weights: Floats, centres: Floats) -> Floats:
     """Add the point that lowers the sum of squares most, of the 256 that add most to it."""
     nearest = distances2(points, centres).min(axis=1)
     candidates = np.argsort(-weights * nearest, kind="stable")[:256]
-    gains = weights @ np.maximum(nearest[:, None] - distances2(points, points[candidates]), 0.0)
+    lowered = np.maximum(nearest[:, None] - distances2(points, points[candidates]), 0.0)
+    gains = (weights[:, None] * lowered).sum(axis=0)  # no BLAS, whose sums hang on its number of threads
     return np.vstack([centres, points[candidates[gains.argmax()]]])
 
 
@@ -147,7 +148,8 @@ def _cut(points: Floats, weights: Floats, centres: Floats) -> Floats:
     worst = int(np.bincount(nearest, weights * distances.min(axis=1), len(centres)).argmax())
     mine = nearest == worst
     away = points[mine] - centres[worst]
-    values, axes = np.linalg.eigh((away * weights[mine, None]).T @ away / weights[mine].sum())
+    spread = (weights[mine, None, None] * away[:, :, None] * away[:, None, :]).sum(axis=0)
+    values, axes = np.linalg.eigh(spread / weights[mine].sum())
     step = np.sqrt(max(values[-1], 0.0)) * axes[:, -1]
     return np.vstack([np.delete(centres, worst, axis=0), centres[worst] - step, centres[worst] + step])
 

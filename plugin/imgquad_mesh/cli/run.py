@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from imgquad_core.errors import InputError
+from imgquad_core.limits import check_real
 from imgquad_mesh.texts import number
 
 from .element_options import add_element_options, element_options, writer_options
@@ -125,6 +126,8 @@ def mesh_to_files(
     start = perf_counter()
     writing = writing or Writing()
     outputs.check(image, *writing.inputs)
+    if min_quality is not None:
+        check_real("min_quality", min_quality, -1.0, 1.0)
     if crosscheck:
         meshlab_filters()  # where pymeshlab is missing, that is said before any work is done
     if not quiet:
