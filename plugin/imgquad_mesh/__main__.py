@@ -9,14 +9,10 @@ from collections.abc import Sequence
 from io import TextIOWrapper
 from typing import NoReturn
 
-from imgquad_core.errors import ImgquadError, InputError, QualityError
-
-from .cli import demo, list_filters, run, script
 from .cli.interruption import handling_signals
 
 GOOD, BUG, BAD_INPUT, LIMIT_NOT_MET = 0, 1, 2, 3
 BY_SIGNAL = 128  #: plus the number of the signal, as shells have it
-COMMANDS = (run, demo, script, list_filters)
 
 
 class Parser(argparse.ArgumentParser):
@@ -29,6 +25,8 @@ class Parser(argparse.ArgumentParser):
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of the command with all its subcommands."""
+    from .cli import demo, list_filters, run, script
+
     parser = Parser(
         prog="imgquad-mesh",
         description="Turns any picture of a structure into an all-quadrilateral, multi-material finite element mesh.",
@@ -36,7 +34,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
-    for command in COMMANDS:
+    for command in (run, demo, script, list_filters):
         command.add_parser(subparsers)
     return parser
 
@@ -46,9 +44,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files that the terminal cannot show
-    args = build_parser().parse_args(argv)
-    with handling_signals() as interruption:
+    with handling_signals() as interruption:  # before anything is loaded, which takes its time
         try:
+            args = build_parser().parse_args(argv)
             return int(args.execute(args))
         except BrokenPipeError:
             return GOOD
@@ -62,6 +60,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _told(error: Exception) -> tuple[object, int]:
     """Return what to say of an error, and the exit code; raise it where it is none of ours."""
+    from imgquad_core.errors import ImgquadError, InputError, QualityError
+
     if isinstance(error, QualityError):
         return error, LIMIT_NOT_MET
     if isinstance(error, InputError):
