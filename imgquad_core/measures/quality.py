@@ -15,10 +15,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.declared import Declaration
 from imgquad_core.errors import QualityError
 from imgquad_core.geometry.halfedge import twins_of
-from imgquad_core.limits import check_real
 from imgquad_core.model import QuadMesh
+
+MIN_QUALITY = Declaration(0.0, "least scaled Jacobian that is asked for", float, least=-1.0, most=1.0)
 
 GOOD_ANGLES = (45.0, 135.0)  #: range of a corner's angle, in degrees, that Verdict calls acceptable
 
@@ -229,7 +231,7 @@ def require_quality(mesh: QuadMesh, limit: float, most: int = 5) -> None:
 
     The message says how many quads are, how many of them the picture forces, and names at most `most` of the worst.
     """
-    check_real("min_quality", limit, -1.0, 1.0)
+    MIN_QUALITY.check("min_quality", limit)
     below = scaled_jacobian(mesh.points, mesh.quads) < limit
     if not below.any():
         return

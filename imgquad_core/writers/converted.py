@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
+from time import time
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from imgquad_core.whole_files import replacing, take_room
 
 from .common import points_3d, refuse_cohesive, refuse_six_nodes
 from .gmsh import gmsh_text
+from .hdf5_times import erase_times
 from .neighbours import is_of_xdmf
 
 OVERHEAD = 200_000  #: bytes of an HDF5 file besides the arrays, at most
@@ -59,6 +61,7 @@ def _by_gmsh(mesh: FEMesh, path: str | Path, name_limit: int) -> None:
         with source.open("w", encoding="utf-8", newline="\n") as stream:
             stream.writelines(gmsh_text(mesh, name_limit=name_limit))
         take_room(temporary.parent, MOST_TIMES * source.stat().st_size + OVERHEAD)
+        start = time()
         gmsh.initialize(interruptible=False)
         try:
             gmsh.option.setNumber("General.Terminal", 0)
@@ -67,6 +70,8 @@ def _by_gmsh(mesh: FEMesh, path: str | Path, name_limit: int) -> None:
         finally:
             gmsh.finalize()
         source.unlink()
+        if temporary.suffix == ".med":
+            erase_times(temporary, start, time())
 
 
 def write_xdmf(mesh: FEMesh, path: str | Path) -> None:

@@ -10,7 +10,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from imgquad_core.errors import InputError
-from imgquad_core.limits import check_real
 from imgquad_mesh.texts import number
 
 from .element_options import add_element_options, element_options, writer_options
@@ -115,7 +114,7 @@ def mesh_to_files(
         A quad is below `min_quality`, or with `crosscheck` another program measures other figures; all files are
         written.
     """
-    from imgquad_core.measures.quality import require_quality
+    from imgquad_core.measures.quality import MIN_QUALITY, require_quality
     from imgquad_mesh.meshlab.catalogue import meshlab_filters
     from imgquad_mesh.outputs import files
     from imgquad_mesh.outputs.report import build_report, element_notes
@@ -127,7 +126,7 @@ def mesh_to_files(
     writing = writing or Writing()
     outputs.check(image, *writing.inputs)
     if min_quality is not None:
-        check_real("min_quality", min_quality, -1.0, 1.0)
+        MIN_QUALITY.check("min_quality", min_quality)
     if crosscheck:
         meshlab_filters()  # where pymeshlab is missing, that is said before any work is done
     if not quiet:

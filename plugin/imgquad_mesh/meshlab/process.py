@@ -19,8 +19,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from imgquad_core.declared import Declaration
 from imgquad_core.errors import ImgquadError
-from imgquad_core.limits import check_real
 
 from .catalogue import meshlab_filters
 from .layer import Layer, load_layer, save_layer
@@ -33,6 +33,8 @@ _MOVING = 20.0  #: seconds for taking a mesh out or putting one in where no filt
 _LONGEST = 1e8  #: seconds, three years: what a deadline of infinity means
 _SHARE = 0.5  #: of the machine's memory that the process may use where no limit is asked for
 _LEAST_MEMORY = 2.0  #: GB, below which pymeshlab itself cannot be relied on
+MEMORY_LIMIT = Declaration(8.0, "memory of MeshLab", float, least=_LEAST_MEMORY, unit="GB")
+DEADLINE = Declaration(120.0, "time of a filter of MeshLab", float, above=0.0, unit="s")
 _OUT_OF_MEMORY = re.compile(r"bad_alloc|MemoryError|[Cc]annot allocate|out of memory|bad allocation")
 
 
@@ -45,7 +47,7 @@ def memory_limit(asked: float | None) -> float:
         What was asked for is less than pymeshlab itself needs.
     """
     if asked is not None:
-        check_real("memory", asked, _LEAST_MEMORY, 1e6, "GB")
+        MEMORY_LIMIT.check("memory", asked)
         return float(asked)
     try:
         machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9

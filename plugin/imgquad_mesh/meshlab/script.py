@@ -13,7 +13,6 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 from imgquad_core.errors import ImgquadError, InputError, ScriptError
-from imgquad_core.limits import check_real
 from imgquad_core.model import LabelImage, QuadMesh
 from imgquad_core.whole_files import scratch_folder
 from imgquad_mesh.outputs.files import GRID_EXTENSIONS, check_files, replace_file
@@ -22,7 +21,7 @@ from .checking import MeshLabStep, OwnStep, checked_steps, files_of_steps
 from .layer import Layer, layer_of, write_ply
 from .meshsets import add_to
 from .mlx import read_script
-from .process import MeshLabError, MeshLabProcess, memory_limit
+from .process import DEADLINE, MeshLabError, MeshLabProcess, memory_limit
 from .saving import check_saving, read_grid, save_current
 from .state import LayerList, State
 from .steps import STEPS
@@ -140,7 +139,8 @@ def run_script(
     pymeshlab.
     """
     script = read_script(path)
-    check_real("deadline", deadline, 1e-3, inf, "s")
+    if deadline != inf:
+        DEADLINE.check("deadline", deadline)
     memory = memory_limit(memory)
     base = Path(folder) if folder is not None else Path(path).resolve().parent
     steps = checked_steps(script, base)

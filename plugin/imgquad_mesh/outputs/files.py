@@ -7,12 +7,14 @@ import tempfile
 from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
+from time import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from imgquad_core.errors import InputError
 from imgquad_core.whole_files import assert_apart, real_target, replacing, take_room
+from imgquad_core.writers.hdf5_times import erase_times
 from imgquad_core.writers.neighbours import check_neighbours, files_of
 
 if TYPE_CHECKING:
@@ -187,10 +189,11 @@ def save_dataset(dataset: Any, path: Path) -> None:
         arrays = len(dataset.array_names) + 6  # with points, cells
         take_room(path.parent, 1024 * dataset.GetActualMemorySize() + 8 * HDF_CHUNK * arrays)
     if path.suffix.lower() not in writers:
-        from imgquad_mesh.datasets.vtk_files import silent_vtk
-
+        start = time()
         with silent_vtk():
             dataset.save(path)
+        if path.suffix.lower() == ".vtkhdf":
+            erase_times(path, start, time())
         return
     writer = writers[path.suffix.lower()]()
     writer.SetInputData(dataset)

@@ -17,6 +17,7 @@ DISTINCT = 40  #: least difference between the colours of two materials, in one 
 
 def draw_materials(mesh: QuadMesh, path: Path) -> None:
     """Draw the mesh coloured by material, with its edges where they are wide enough to be seen, and a legend."""
+    from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
@@ -41,7 +42,10 @@ def draw_materials(mesh: QuadMesh, path: Path) -> None:
     keys = [Patch(facecolor=colors[np.searchsorted(mesh.materials.labels, m)], edgecolor="black") for m in used[:24]]
     names = [mesh.materials.name_of(int(m)) for m in used[:24]]
     figure.legend(keys, names, loc="center right", frameon=False, fontsize=11)
-    figure.savefig(path, format=path.suffix.lstrip(".").lower() or "png", facecolor="white", metadata=_undated(path))
+    with rc_context({"svg.hashsalt": "imgquad-mesh"}):  # names of shapes that hang on nothing else
+        figure.savefig(
+            path, format=path.suffix.lstrip(".").lower() or "png", facecolor="white", metadata=_undated(path)
+        )
 
 
 def material_colors(materials: Materials) -> NDArray[np.float64]:
