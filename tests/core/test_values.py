@@ -16,9 +16,9 @@ import pytest
 from imgquad_core import MeshOptions, mesh_image, run
 from imgquad_core.errors import ImgquadError, InputError, QualityError, ScriptError
 from imgquad_core.fe import ElementOptions, make_elements
+from imgquad_core.frozen import FrozenMapping
 from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.measures.quality import quality_report
-from imgquad_core.model import FrozenMapping
 
 LABELS = np.zeros((20, 30), np.int32)
 LABELS[5:15, 8:20] = 1

@@ -108,8 +108,8 @@ def test_order_two_and_extrusion_carry_the_pairs() -> None:
     step = hexes.points[hexes.periodic["x"][:, 1]] - hexes.points[hexes.periodic["x"][:, 0]]
     assert (step == [24, 0, 0]).all()
     assert len(hexes.periodic["x"]) == 3 * 25
-    split = with_periodic_pairs(
-        split_interfaces(fe_mesh(staircase(np.repeat([[0], [1]], 4, axis=0).repeat(4, 1)))), "x"
+    split = split_interfaces(
+        with_periodic_pairs(fe_mesh(staircase(np.repeat([[0], [1]], 4, axis=0).repeat(4, 1))), "x")
     )
     a, b = split.periodic["x"].T  # the node on the interface is there twice on each side
     assert len(a) == 10
@@ -121,7 +121,7 @@ def test_order_two_and_extrusion_carry_the_pairs() -> None:
 def test_sides_that_do_not_match_are_said() -> None:
     across = np.zeros((20, 20), int)
     across[8:12, :10] = 1  # an interface meets the left border, none the right one
-    with pytest.raises(InputError, match="split interfaces meet them at different places"):
+    with pytest.raises(InputError, match="pair the sides first, then split"):
         with_periodic_pairs(split_interfaces(fe_mesh(staircase(across))), "x")
     plain = mesh_image(
         np.arange(60)[:, None].repeat(60, 1) * np.ones(60) > np.linspace(10, 45, 60), MeshOptions(size=4.0)

@@ -1,0 +1,392 @@
+"""A campaign against the promises of docs/promises.md: kills, full disks, damaged caches, odd input. Prints a table.
+
+python benchmarks/faults.py                            every section, as often as stands in SECTIONS
+python benchmarks/faults.py kills meshes --seed 7      some of them, with another seed
+python benchmarks/faults.py --share 0.02               a slice: 2 % of the trials of each (one at least)
+
+A trial fails by an `AssertionError` or any other exception; the first failures are printed with what repeats them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT / "tests")]
+
+Generator = np.random.Generator
+MESH_FORMATS = (".vtu", ".vtk", ".vtkhdf", ".inp", ".msh", ".bdf", ".e", ".npz", ".svg", ".obj", ".ply", ".dxf")
+COMMAND = [sys.executable, "-m", "imgquad_mesh"]
+MOST_SECONDS = 300
+
+
+def path() -> str:
+    """PYTHONPATH of the processes that are started: this checkout."""
+    return os.pathsep.join([str(ROOT), str(ROOT / "plugin"), os.environ.get("PYTHONPATH", "")])
+
+
+def command(folder: Path, *arguments: object, **environment: str) -> subprocess.Popen[str]:
+    """Start the command in `folder`."""
+    env = os.environ | {"PYTHONPATH": path(), "PYTHONDONTWRITEBYTECODE": "1"} | environment
+    pipe = subprocess.PIPE
+    return subprocess.Popen([*COMMAND, *map(str, arguments)], cwd=folder, env=env, stdout=pipe, stderr=pipe, text=True)
+
+
+def leftovers(folder: Path) -> list[str]:
+    """Names of what an ended process left of unfinished files."""
+    return [file.name for file in folder.rglob(".imgquad-*")]
+
+
+def draw_labels(rng: Generator) -> np.ndarray:
+    """Return an odd label picture: noise, walks, stripes, lattices, blobs, or a mixture."""
+    rows, cols, n = int(rng.integers(1, 48)), int(rng.integers(1, 48)), int(rng.integers(1, 7))
+    kind = rng.integers(6)
+    if kind == 0:
+        return rng.integers(0, n, (rows, cols), dtype=np.int32)
+    y, x = np.mgrid[:rows, :cols]
+    if kind == 1:
+        a, b = rng.integers(1, 9, 2)
+        return ((x // a + y // b) % n).astype(np.int32)
+    if kind == 2:
+        centres = rng.uniform(0, 1, (n * 3, 2)) * (rows, cols)
+        away = (y[..., None] - centres[:, 0]) ** 2 + (x[..., None] - centres[:, 1]) ** 2
+        return (away.argmin(axis=2) % n).astype(np.int32)
+    labels = np.zeros((rows, cols), np.int32)
+    if kind == 3:  # a walk of single pixels
+        at = np.array([rows // 2, cols // 2])
+        for step in rng.integers(0, 8, 4 * (rows + cols)):
+            at = (at + ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1))[step]) % (rows, cols)
+            labels[tuple(at)] = 1 + step % n
+        return labels
+    if kind == 4:  # thin diagonals
+        labels[(x + (1 if rng.random() < 0.5 else -1) * y) % int(rng.integers(2, 7)) == 0] = n
+        return labels
+    labels[rng.random((rows, cols)) < 0.2] = 1
+    return np.asarray(np.kron(labels, np.ones((int(rng.integers(1, 4)),) * 2)), np.int32)[:60, :60]
+
+
+def draw_options(rng: Generator, **more: object) -> dict[str, object]:
+    """Return options of a mesh within their limits."""
+    return {
+        "size": float(rng.choice([1.0, 2.5, 6.0])),
+        "effort": str(rng.choice(["fast", "normal", "best"])),
+        "policy": str(rng.choice(["minority", "majority", "lower", "diagonal", "junction"])),
+        **more,
+    }
+
+
+def picture_file(folder: Path, rng: Generator, side: int = 60) -> Path:
+    """Save a picture of blobs."""
+    y, x = np.mgrid[:side, :side]
+    centres = rng.uniform(0, side, (12, 2))
+    labels = ((y[..., None] - centres[:, 0]) ** 2 + (x[..., None] - centres[:, 1]) ** 2).argmin(axis=2) % 4
+    Image.fromarray((labels * 80).astype(np.uint8)).save(folder / "in.png")
+    return folder / "in.png"
+
+
+# --------------------------------------------------------------------------------------------------- sections
+
+
+def kills(rng: Generator, folder: Path) -> None:
+    """A signal at a random moment: each output is the old one or the whole new one, nothing is left but by SIGKILL."""
+    picture_file(folder, rng)
+    outputs = {
+        "mesh": folder / f"m{rng.choice(MESH_FORMATS)}",
+        "report": folder / "m.json",
+        "picture": folder / "p.png",
+    }
+    arguments = ["run", "in.png", outputs["mesh"], "--report", "m.json", "--picture", "p.png", "--quiet"]
+    start = time.perf_counter()
+    process = command(folder, *arguments)
+    said = process.communicate(timeout=MOST_SECONDS)[1]
+    assert process.returncode == 0, said
+    lasts = time.perf_counter() - start
+    whole = {name: file.read_bytes() for name, file in outputs.items()}
+    for file in outputs.values():
+        file.write_bytes(b"old")
+    number = int(rng.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT]))
+    process = command(folder, *arguments)
+    time.sleep(float(rng.uniform(0.3, 1.0)) * lasts)
+    process.send_signal(number)
+    said = process.communicate(timeout=MOST_SECONDS)[1]
+    for name, file in outputs.items():
+        now = file.read_bytes()
+        assert now == b"old" or now == whole[name] or name == "report", f"{name} is neither old nor whole"
+    assert process.returncode in (0, -number, 128 + number), (process.returncode, said)
+    assert number == signal.SIGKILL or not leftovers(folder), leftovers(folder)
+    assert "Traceback" not in said, said
+
+
+FULL = """
+import resource, signal, sys
+from pathlib import Path
+import numpy as np
+from imgquad_core import mesh_image
+from imgquad_core.errors import InputError
+from imgquad_mesh.outputs.files import write_mesh_file
+path, share = Path(sys.argv[1]), float(sys.argv[2])
+labels = np.zeros((40, 60), np.int32); labels[10:30, 20:40] = 1
+mesh = mesh_image(labels)
+write_mesh_file(mesh, path)
+whole = path.read_bytes()
+path.write_bytes(b"old")
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(share * len(whole)),) * 2)
+try:
+    write_mesh_file(mesh, path)
+    assert path.read_bytes() == whole, "a damaged file"
+except InputError as error:
+    assert path.read_bytes() == b"old" and "cannot write" in str(error), error
+assert not list(path.parent.glob(".imgquad-*")), "leftovers"
+"""
+
+
+def full_disks(rng: Generator, folder: Path) -> None:
+    """A limit on the size of files, from 2 to 120 % of what is needed: one line, the old file whole."""
+    target, share = folder / f"m{rng.choice(MESH_FORMATS)}", rng.uniform(0.02, 1.2)
+    env = os.environ | {"PYTHONPATH": path(), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, str(target), str(share)], capture_output=True, text=True, env=env, check=False
+    )
+    assert done.returncode == 0, (target.name, share, done.stderr[-500:])
+
+
+CACHED = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import cached_kernel
+assert cached_kernel.double(3.0) == 6.0
+"""
+
+
+def caches(rng: Generator, folder: Path) -> None:
+    """Bytes of the kernel cache cut, zeroed or changed at random: compiled again, and healed."""
+    (folder / "cached_kernel.py").write_text(
+        "from imgquad_core.jit import kernel\n@kernel\ndef double(x):\n    return 2.0 * x\n"
+    )
+    env = os.environ | {"PYTHONPATH": path(), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    use = [sys.executable, "-c", CACHED, str(folder)]
+    subprocess.run(use, env=env, check=True)
+    for file in folder.rglob("*.nb[ic]"):
+        data = bytearray(file.read_bytes())
+        first, last = np.sort(rng.integers(0, len(data), 2))
+        how = rng.integers(3)
+        if how == 0:
+            del data[first:]
+        elif how == 1:
+            data[first:last] = bytes(int(last - first))
+        else:
+            data[first:last] = rng.bytes(int(last - first))
+        file.write_bytes(data)
+    for _ in range(2):
+        done = subprocess.run(use, env=env, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, ""), done.stderr[-500:]
+
+
+def meshes(rng: Generator, folder: Path) -> None:
+    """A mesh of any label picture: valid by the judge of the tests, twice the same bytes, valid turned, too."""
+    from imgquad_core import MeshOptions, run
+    from support.invariants import assert_valid_mesh
+    from support.labels import label_image
+
+    labels = draw_labels(rng)
+    options = MeshOptions(**draw_options(rng))  # type: ignore[arg-type]
+    made, again = run(label_image(labels), options), run(label_image(labels), options)
+    assert_valid_mesh(made.mesh, made.labels)
+    assert made.mesh.points.tobytes() == again.mesh.points.tobytes()
+    assert made.mesh.quads.tobytes() == again.mesh.quads.tobytes()
+    turned = run(label_image(np.rot90(labels, int(rng.integers(1, 4)))), options)
+    assert_valid_mesh(turned.mesh, turned.labels)
+    assert np.array_equal(pickle.loads(pickle.dumps(made)).mesh.points, made.mesh.points)
+
+
+def elements(rng: Generator, folder: Path) -> None:
+    """Periodic, of second order, cohesive, extruded, materials dropped: an `InputError`, or a mesh without a fault."""
+    from imgquad_core import MeshOptions, mesh_image
+    from imgquad_core.errors import InputError
+    from imgquad_core.fe import ElementOptions, make_elements
+    from support.labels import label_image
+
+    labels = draw_labels(rng)
+    periodic = str(rng.choice(["none", "x", "y", "xy"]))
+    dropped = rng.choice(np.unique(labels), 1).tolist() if rng.random() < 0.3 else []
+    with suppress(InputError):
+        mesh = mesh_image(label_image(labels), MeshOptions(size=4.0, effort="fast", periodic=periodic, drop=dropped))
+        order = int(rng.integers(1, 3))
+        made = make_elements(
+            mesh,
+            ElementOptions(
+                order=order,
+                cohesive="all" if rng.random() < 0.5 else None,
+                extrude=2.0 if order == 1 and rng.random() < 0.5 else None,
+                periodic=None if periodic == "none" else periodic,
+            ),
+        )
+        used = np.unique(np.concatenate([made.cells.ravel(), made.cohesive.ravel()]))
+        assert np.array_equal(used, np.arange(made.n_points)), "unused nodes"
+        period = np.ptp(made.points, axis=0)
+        for direction, pairs in made.periodic.items():
+            axis = "xyz".index(direction)
+            step = made.points[pairs[:, 1]] - made.points[pairs[:, 0]]
+            assert len(pairs), "no pair"
+            assert np.abs(step - np.eye(step.shape[1])[axis] * period[axis]).max() < 1e-6, "pairs that do not match"
+
+
+HASHED = """
+import hashlib, sys
+import numpy as np
+from imgquad_core import MeshOptions, mesh_image
+labels = np.load(sys.argv[1])
+mesh = mesh_image(labels, MeshOptions(size=4.0, effort="fast", colors="exact", threads=int(sys.argv[2])))
+print(hashlib.sha256(mesh.points.tobytes() + mesh.quads.tobytes()).hexdigest())
+"""
+
+
+def threads(rng: Generator, folder: Path) -> None:
+    """More than 10,000 regions: the same bytes for 1, 2, 4 threads of BLAS and 1, 2, 16 of ours."""
+    np.save(folder / "l.npy", rng.integers(0, 16, (120, 125), dtype=np.int32))
+    found = set()
+    for blas, ours in ((1, 1), (2, 1), (4, 2), (1, 16)):
+        env = os.environ | {"PYTHONPATH": path(), "OPENBLAS_NUM_THREADS": str(blas), "OMP_NUM_THREADS": str(blas)}
+        command = [sys.executable, "-c", HASHED, str(folder / "l.npy"), str(ours)]
+        found.add(subprocess.run(command, capture_output=True, text=True, env=env, check=True).stdout)
+    assert len(found) == 1
+
+
+ODD = ("nan", "inf", "-1", "0", "1e308", "x", "", "1,2", "0x10", "٣", "1e-320", "9" * 40)
+NUMBERS = ("size", "boundary-size", "growth", "edge-ratio", "max-shift", "pixel-size", "min-pixels", "min-length")
+OTHERS = ("threads", "frame", "max-pixels", "crop", "colors", "size-of", "drop", "extrude", "layers", "min-quality")
+
+
+def options(rng: Generator, folder: Path) -> None:
+    """An odd value of an option of the command: a mesh, or one line and the code 2."""
+    picture_file(folder, rng, 30)
+    name, value = rng.choice(NUMBERS + OTHERS), rng.choice(ODD)
+    process = command(folder, "run", "in.png", "m.vtu", f"--{name}={value}", "--quiet")
+    said = process.communicate(timeout=MOST_SECONDS)[1]
+    assert process.returncode in (0, 2, 3), (name, value, process.returncode, said)
+    assert len(said.strip().splitlines()) <= 1, (name, value, said)
+
+
+def readers(rng: Generator, folder: Path) -> None:
+    """A file of each kind that is read, damaged at random: it is read, or one `InputError`."""
+    from imgquad_core.errors import InputError
+    from imgquad_core.picture import read_picture
+    from imgquad_mesh.meshlab.mlx import read_script
+    from imgquad_mesh.outputs.files import read_vti
+
+    kind = str(rng.choice(["png", "tif", "bmp", "ppm", "gif", "jpg", "webp", "npy", "vti", "mlx"]))
+    file = folder / f"in.{kind}"
+    labels = rng.integers(0, 5, (20, 30), dtype=np.uint8)
+    if kind == "npy":
+        np.save(file, labels)
+    elif kind == "vti":
+        import pyvista as pv
+
+        image = pv.ImageData(dimensions=(31, 21, 1))
+        image.cell_data["label"] = labels.ravel()
+        image.save(file)
+    elif kind == "mlx":
+        from imgquad_core import MeshOptions
+        from imgquad_mesh.meshlab.templates import run_as_script
+
+        file.write_text(run_as_script(MeshOptions()), encoding="utf-8")
+    else:
+        Image.fromarray(labels).save(file)
+    data = bytearray(file.read_bytes())
+    for _ in range(int(rng.integers(1, 9))):
+        at = int(rng.integers(len(data)))
+        data[at] = int(rng.integers(256))
+    file.write_bytes(data[: int(rng.integers(1, len(data) + 1))] if rng.random() < 0.5 else data)
+    with suppress(InputError):
+        if kind == "vti":
+            read_vti(file, 10_000)
+        else:
+            read_script(file) if kind == "mlx" else read_picture(file)
+
+
+class Section(NamedTuple):
+    """One kind of trial, and how often the whole campaign tries it."""
+
+    trial: Callable[[Generator, Path], None]
+    times: int
+
+
+SECTIONS = {
+    f.__name__.replace("_", "-"): Section(f, times)
+    for f, times in (
+        (kills, 250),
+        (full_disks, 250),
+        (caches, 60),
+        (meshes, 4000),  # two pictures each: as it is and turned
+        (elements, 1500),
+        (threads, 10),
+        (options, 400),
+        (readers, 3000),
+    )
+}
+
+
+class Outcome(NamedTuple):
+    """What one section gave."""
+
+    tried: int
+    failed: list[str]
+    seconds: float
+
+
+def campaign(name: str, seed: int, times: int) -> Outcome:
+    """Try `times` trials of a section; each has its own seed, so that one can be repeated alone."""
+    failed, start = [], time.perf_counter()
+    for k in range(times):
+        digest = hashlib.sha256(f"{name} {seed} {k}".encode()).digest()
+        rng = np.random.default_rng(list(digest))
+        with tempfile.TemporaryDirectory(prefix="imgquad-faults-") as folder:
+            try:
+                SECTIONS[name].trial(rng, Path(folder))
+            except Exception as error:  # whatever it is, it is a fault
+                failed.append(f"{name}, seed {seed}, trial {k}: {type(error).__name__}: {str(error)[:300]}")
+    return Outcome(times, failed, time.perf_counter() - start)
+
+
+def table(outcomes: dict[str, Outcome]) -> str:
+    """Return the table of the docs."""
+    lines = ["| section | what | tried | failed |", "|---|---|---:|---:|"]
+    for name, found in outcomes.items():
+        what = (SECTIONS[name].trial.__doc__ or "").strip().rstrip(".")
+        lines.append(f"| {name} | {what} | {found.tried} | {len(found.failed)} |")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Run what is asked for; return 1 if a trial failed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sections", nargs="*", choices=[*SECTIONS, []], help="default: all")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--share", type=float, default=1.0, help="of the trials of each section (default: 1)")
+    args = parser.parse_args()
+    outcomes = {}
+    for name in args.sections or SECTIONS:
+        outcomes[name] = campaign(name, args.seed, max(1, round(args.share * SECTIONS[name].times)))
+        print(f"{name}: {outcomes[name].seconds:.0f} s", *outcomes[name].failed[:5], sep="\n", file=sys.stderr)
+    print(table(outcomes))
+    return int(any(found.failed for found in outcomes.values()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+"""Periodic cells with cohesive interfaces: copies of nodes on both sides are tied, whatever the picture."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from imgquad_core import MeshOptions, mesh_image
+from imgquad_core.fe import ElementOptions, FEMesh, make_elements
+from imgquad_core.fe.cohesive import closed_ends
+from imgquad_core.writers.abaqus.equations import _ties
+from support.handmade import staircase
+
+
+def tileable(seed: int, shape: tuple[int, int] = (36, 42)) -> np.ndarray:
+    """Filtered noise that goes on beyond its border."""
+    noise = gaussian_filter(np.random.default_rng(seed).normal(size=shape), 3, mode="wrap")
+    return np.digitize(noise, np.quantile(noise, [0.35, 0.7])).astype(np.int32)
+
+
+def assert_tied(mesh: FEMesh) -> None:
+    """Partners are a period apart, each node has one, and each tie leads from its master over whole periods."""
+    period = np.ptp(mesh.points, axis=0)
+    for direction, pairs in mesh.periodic.items():
+        step = mesh.points[pairs[:, 1]] - mesh.points[pairs[:, 0]]
+        expected = np.where(np.arange(mesh.points.shape[1]) == "xyz".index(direction), period, 0.0)
+        assert np.abs(step - expected).max() < 1e-6
+        assert len(np.unique(pairs[:, 0])) == len(np.unique(pairs[:, 1])) == len(pairs)
+    ties = _ties(mesh)
+    assert not {master for master, _ in ties.values()} & set(ties)  # no master is a slave
+    for slave, (master, steps) in ties.items():
+        way = sum(n * period["xyz".index(d)] * np.eye(mesh.points.shape[1])["xyz".index(d)] for d, n in steps.items())
+        assert np.abs(mesh.points[slave] - mesh.points[master] - way).max() < 1e-6
+
+
+def assert_whole(mesh: FEMesh) -> None:
+    assert np.array_equal(
+        np.unique(np.concatenate([mesh.cells.ravel(), mesh.cohesive.ravel()])), np.arange(mesh.n_points)
+    )
+    for first, second in pairwise([mesh.cohesive[:, :2], mesh.cohesive[:, [3, 2]]]):
+        assert np.abs(mesh.points[first] - mesh.points[second]).max() < 1e-9  # no thickness
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("order", [1, 2])
+def test_tileable_pictures_make_periodic_cells_with_cohesive_interfaces(seed: int, order: int) -> None:
+    mesh = mesh_image(tileable(seed), MeshOptions(size=3.0, periodic="xy", effort="fast"))
+    made = make_elements(mesh, ElementOptions(order=order, cohesive="all", periodic="xy"))
+    plain = make_elements(mesh, ElementOptions(order=order, periodic="xy"))
+    assert_tied(made)
+    assert_whole(made)
+    assert all(len(made.periodic[d]) >= len(plain.periodic[d]) for d in "xy")
+
+
+def test_any_picture_does_with_its_interfaces_closed_where_they_do_not_go_on() -> None:
+    labels = np.array([[0, 0], [0, 1], [1, 0], [0, 0]], np.int32)
+    made = make_elements(mesh_image(labels, MeshOptions(periodic="x")), ElementOptions(cohesive="all", periodic="x"))
+    assert_tied(made)
+    assert_whole(made)
+    assert closed_ends(made) > 0
+
+
+def test_an_interface_across_the_seam_is_split_on_both_sides() -> None:
+    layers = np.repeat([0, 1, 0], 4)[:, None].repeat(6, 1)
+    mesh = make_elements(staircase(layers), ElementOptions(cohesive="all", periodic="xy"))
+    assert closed_ends(mesh) == 0
+    assert_tied(mesh)
+    a, b = mesh.periodic["x"].T
+    assert len(a) == 13 + 2  # both interfaces have two nodes on either side
+    materials = [
+        {int(m) for m in mesh.cell_material[(mesh.cells == n).any(axis=1)]} for n in np.stack([a, b]).T.ravel()
+    ]
+    assert materials[::2] == materials[1::2]
+
+
+def test_the_seam_is_whole_where_materials_differ_across_it() -> None:
+    halves = np.repeat([0, 1], 3)[None, :].repeat(4, 0)  # 0 meets 1 in the middle and again across the seam
+    mesh = make_elements(staircase(halves), ElementOptions(cohesive="all", periodic="x"))
+    assert len(mesh.cohesive) == 4
+    assert len(mesh.periodic["x"]) == 5
+    assert_tied(mesh)
+
+
+def test_corners_that_are_tied_over_the_other_diagonal_lose_no_tie() -> None:
+    """At the corner of the cell interfaces can part the lower left from the rest: the upper left is the master."""
+    for seed in range(30):
+        labels = np.random.default_rng(seed).integers(0, 3, (5, 6)).astype(np.int32)
+        mesh = make_elements(staircase(labels), ElementOptions(cohesive="all", periodic="xy"))
+        assert_tied(mesh)
+        tied = {frozenset(pair) for pairs in mesh.periodic.values() for pair in pairs.tolist()}
+        ties = _ties(mesh)
+        for a, b in map(tuple, tied):
+            assert ties.get(a, (a, {}))[0] == ties.get(b, (b, {}))[0]  # of one group
