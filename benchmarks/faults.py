@@ -53,31 +53,11 @@ def leftovers(folder: Path) -> list[str]:
 
 
 def draw_labels(rng: Generator) -> np.ndarray:
-    """Return an odd label picture: noise, walks, stripes, lattices, blobs, or a mixture."""
-    rows, cols, n = int(rng.integers(1, 48)), int(rng.integers(1, 48)), int(rng.integers(1, 7))
-    kind = rng.integers(6)
-    if kind == 0:
-        return rng.integers(0, n, (rows, cols), dtype=np.int32)
-    y, x = np.mgrid[:rows, :cols]
-    if kind == 1:
-        a, b = rng.integers(1, 9, 2)
-        return ((x // a + y // b) % n).astype(np.int32)
-    if kind == 2:
-        centres = rng.uniform(0, 1, (n * 3, 2)) * (rows, cols)
-        away = (y[..., None] - centres[:, 0]) ** 2 + (x[..., None] - centres[:, 1]) ** 2
-        return (away.argmin(axis=2) % n).astype(np.int32)
-    labels = np.zeros((rows, cols), np.int32)
-    if kind == 3:  # a walk of single pixels
-        at = np.array([rows // 2, cols // 2])
-        for step in rng.integers(0, 8, 4 * (rows + cols)):
-            at = (at + ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1))[step]) % (rows, cols)
-            labels[tuple(at)] = 1 + step % n
-        return labels
-    if kind == 4:  # thin diagonals
-        labels[(x + (1 if rng.random() < 0.5 else -1) * y) % int(rng.integers(2, 7)) == 0] = n
-        return labels
-    labels[rng.random((rows, cols)) < 0.2] = 1
-    return np.asarray(np.kron(labels, np.ones((int(rng.integers(1, 4)),) * 2)), np.int32)[:60, :60]
+    """Return an odd label picture: noise, checkerboards, stripes, dots, arms, spirals, lines, cells, void."""
+    from support.labels import KINDS, labels_of_kind
+
+    rows, cols, colors = (int(n) for n in (rng.integers(1, 49), rng.integers(1, 49), rng.integers(1, 8)))
+    return labels_of_kind(str(rng.choice(KINDS)), rows, cols, colors, int(rng.integers(1 << 30)))
 
 
 def draw_options(rng: Generator, **more: object) -> dict[str, object]:

@@ -1,0 +1,43 @@
+"""A slice of the campaign against faults, as `python benchmarks/faults.py --share ...` runs it."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+import faults
+
+SLICE = {"kills": 2, "full-disks": 2, "caches": 2, "meshes": 12, "elements": 15, "threads": 1, "options": 4}
+SLICE["readers"] = 150
+    "kills": 2,
+    "full-disks": 2,
+    "caches": 2,
+    "meshes": 12,
+    "elements": 15,
+    "threads": 1,
+    "options": 4,
+    "readers": 150,
+}
+
+
+def test_the_slice_has_every_section() -> None:
+    assert set(SLICE) == set(faults.SECTIONS)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of POSIX")
+@pytest.mark.parametrize("section", SLICE)
+def test_a_slice_of_the_campaign_has_no_failure(section: str) -> None:
+    found = faults.campaign(section, seed=16, times=SLICE[section])
+    assert not found.failed, "\n".join(found.failed)
+
+
+def test_a_trial_that_fails_is_told_with_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        """It breaks."""
+        raise ValueError("broken")
+
+    monkeypatch.setitem(faults.SECTIONS, "broken", faults.Section(broken, 3))
+    found = faults.campaign("broken", 5, 2)
+    assert found.failed == [f"broken, seed 5, trial {k}: ValueError: broken" for k in range(2)]
+    assert faults.table({"broken": found}).endswith("| broken | It breaks | 2 | 2 |")
