@@ -59,6 +59,7 @@ SAME = [
     "run rock.png m.vtu --picture p.png --labels-out p.png",
     "run rock.png m.vtu --picture p.png --labels-out linked/p.png",
     "run rock.png m.vtu --picture p.png --labels-out P.png",
+    "run rock.png m.vtu --marks link.png --labels-out hard.png",
     "script mesh.mlx --input rock.png --output linked/out.vtu",
     "script labels.mlx --input rock.npy",
 ]

@@ -120,7 +120,9 @@ def files_of_steps(steps: Iterable[OwnStep | MeshLabStep], folder: Path) -> tupl
     of_meshlab = [parameter for step in steps if isinstance(step, MeshLabStep) for parameter in step.parameters]
     read = [Path(str(value)) for _, kind, value in of_meshlab if kind == "RichOpenFile" and value]
     written = [Path(str(value)) for _, kind, value in of_meshlab if kind == "RichSaveFile" and value]
-    names = [getattr(step.options, "file_name", None) for step in steps if isinstance(step, OwnStep)]
+    own = [step.options for step in steps if isinstance(step, OwnStep)]
+    read += [Path(marks) for each in own if isinstance(marks := getattr(each, "marks", None), (str, Path))]
+    names = [getattr(each, "file_name", None) for each in own]
     return read, written + [script_path(name, folder) for name in names if name]
 
 
