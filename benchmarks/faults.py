@@ -266,9 +266,9 @@ def options(rng: Generator, folder: Path) -> None:
 def readers(rng: Generator, folder: Path) -> None:
     """A file of each kind that is read, damaged at random: it is read, or one `InputError`."""
     from imgquad_core.errors import InputError
-    from imgquad_core.picture import read_picture
+    from imgquad_core.picture import ReadOptions, read_picture
+    from imgquad_mesh.datasets.vtk_files import read_vtk
     from imgquad_mesh.meshlab.mlx import read_script
-    from imgquad_mesh.outputs.files import read_vti
 
     kind = str(rng.choice(["png", "tif", "bmp", "ppm", "gif", "jpg", "webp", "npy", "vti", "mlx"]))
     file = folder / f"in.{kind}"
@@ -295,7 +295,7 @@ def readers(rng: Generator, folder: Path) -> None:
     file.write_bytes(data[: int(rng.integers(1, len(data) + 1))] if rng.random() < 0.5 else data)
     with suppress(InputError):
         if kind == "vti":
-            read_vti(file, 10_000)
+            read_vtk(file, ReadOptions(max_pixels=10_000))
         else:
             read_script(file) if kind == "mlx" else read_picture(file)
 

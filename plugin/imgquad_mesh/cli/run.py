@@ -124,8 +124,8 @@ def mesh_to_files(
 
     start = perf_counter()
     writing = writing or Writing()
-    marks = options.marks if isinstance(options.marks, (str, Path)) else None
-    outputs.check(image, marks and Path(marks), *writing.inputs)
+    marks = Path(options.marks) if isinstance(options.marks, (str, Path)) else None
+    outputs.check(image, marks, *writing.inputs)
     if min_quality is not None:
         MIN_QUALITY.check("min_quality", min_quality)
     if crosscheck:

@@ -189,6 +189,8 @@ def save_dataset(dataset: Any, path: Path) -> None:
         arrays = len(dataset.array_names) + 6  # with points, cells
         take_room(path.parent, 1024 * dataset.GetActualMemorySize() + 8 * HDF_CHUNK * arrays)
     if path.suffix.lower() not in writers:
+        from imgquad_mesh.datasets.vtk_files import silent_vtk
+
         start = time()
         with silent_vtk():
             dataset.save(path)
