@@ -8,8 +8,7 @@ import pytest
 
 import faults
 
-SLICE = {"kills": 2, "full-disks": 2, "caches": 2, "meshes": 12, "elements": 15, "threads": 1, "options": 4}
-SLICE["readers"] = 150
+SLICE = {
     "kills": 2,
     "full-disks": 2,
     "caches": 2,

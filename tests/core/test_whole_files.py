@@ -158,13 +158,14 @@ def test_an_interrupt_at_any_step_leaves_nothing_at_the_end(tmp_path: Path, monk
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    for step in ("mkdir", "rmtree"):
+    make = Path.mkdir
+    steps = {
+        "made": (Path, "mkdir", lambda self, **k: (make(self, **k), interrupted())),
+        "removed": (whole_files.shutil, "rmtree", interrupted),
+    }
+    for owner, name, broken in steps.values():
         with monkeypatch.context() as patch:
-            if step == "mkdir":
-                real = Path.mkdir
-                patch.setattr(Path, "mkdir", lambda self, **k: (real(self, **k), interrupted()))
-            else:
-                patch.setattr(whole_files.shutil, "rmtree", interrupted)
+            patch.setattr(owner, name, broken)
             with pytest.raises(KeyboardInterrupt), scratch_folder(tmp_path):
                 pass
         whole_files._remove_all()  # as at the end of the process
