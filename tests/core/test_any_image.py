@@ -15,7 +15,9 @@ from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.mesher.efforts import EFFORTS, MeshingOptions
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import VOID, LabelImage, QuadMesh
-from support.invariants import assert_valid_mesh
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import run
+from support.invariants import assert_simplified_mesh, assert_valid_mesh
 from support.labels import KINDS, Labels, label_image, labels_of_kind, spiral, voronoi
 
 SIZES = (1.0, 2.5, 6.0)
@@ -97,6 +99,25 @@ def test_turned_mirrored_and_recoloured_pictures_do_too(
 )
 def test_extremes(labels: Any, size: float, triangulator: str) -> None:
     valid_mesh(label_image(labels), size, triangulator=triangulator)
+
+
+@settings(bounded, max_examples=30)
+@given(
+    pictures(),
+    st.sampled_from(SIZES),
+    st.sampled_from(("auto", 1.0, 2.0, 2.6, (3.0, 2.0))),
+    st.sampled_from((None, 0.0, 3.0, 8.0)),
+    st.sampled_from((0.0, 1.0, 2.5, 4.0, 7.0, 12.0)),
+    st.integers(1, 3),
+    st.integers(0, 3),
+)
+def test_any_step_join_and_tolerance_gives_a_valid_mesh(
+    labels: Labels, size: float, step: Any, join: float | None, tolerance: float, times: int, turns: int
+) -> None:
+    labels = np.rot90(np.repeat(np.repeat(labels, times, axis=0), times, axis=1), turns)
+    options = MeshOptions(size=size, effort="fast", step=step, join=join, tolerance=tolerance)
+    done = run(label_image(labels), options)
+    assert_simplified_mesh(done.mesh, done.labels)
 
 
 def test_recolouring_changes_the_materials_and_nothing_else() -> None:
