@@ -67,8 +67,17 @@ def _own_pixel_limit() -> Iterator[None]:
 def _picture(image: Any, path: Path) -> Picture:
     found = _of_values(image, str(path)) if image.format != "PNG" or not _is_deep(image) else _deep(image, path)
     orientation, note = _orientation(image)
-    notes = (*found.notes, note) if note else found.notes
+    notes = (*found.notes, *filter(None, (note, _shape_in_alpha(found))))
     return replace(_turned(found, orientation), calibration=Calibration(_density(image)), notes=notes)
+
+
+def _shape_in_alpha(picture: Picture) -> str:
+    """Say so where all that is opaque has one colour: then only alpha tells the shape."""
+    if picture.opaque is None or not picture.opaque.any() or picture.palette is not None:
+        return ""
+    seen = picture.values[picture.opaque]
+    is_flat = bool((seen == seen[0]).all())
+    return "all that is opaque has one colour: drop-transparent leaves the rest out" if is_flat else ""
 
 
 def _of_values(image: Any, name: str) -> Picture:

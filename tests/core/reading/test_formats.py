@@ -334,6 +334,17 @@ def test_16_bit_colours_of_a_png_come_whole_or_are_told(tmp_path: Path) -> None:
         assert "upper 8" in found.notes[0]
 
 
+def test_a_shape_that_only_alpha_holds_is_told_and_ends_at_half(tmp_path: Path) -> None:
+    alpha = np.clip(255 - 40 * (np.hypot(*np.mgrid[-10:10, -15:15]) - 6), 0, 255).astype(np.uint8)
+    Image.fromarray(np.dstack([np.full((20, 30, 3), 9, np.uint8), alpha])).save(tmp_path / "a.png")
+    found = read_picture(tmp_path / "a.png")
+    assert "drop-transparent" in found.notes[0]
+    assert found.opaque is not None
+    assert (found.opaque == (alpha > 127)).all()
+    Image.fromarray(np.dstack([PLANE, PLANE, PLANE, alpha[:20, :30]])).save(tmp_path / "b.png")
+    assert read_picture(tmp_path / "b.png").notes == ()
+
+
 def test_an_orientation_that_is_older_than_the_pixels_is_not_followed(tmp_path: Path) -> None:
     exif = Image.Exif()
     exif[274] = 6
