@@ -131,10 +131,10 @@ def _without_constants(levels: Levels, number: int | None) -> tuple[list[Constan
     if constants:
         fixed = np.logical_or.reduce([constant.pixels for constant in constants])
         noise_inside = noise_of(levels, fixed)
-        smooth = smoothed(levels, noise_inside, fixed)
-        if np.count_nonzero(smooth.support) >= LEFT * fixed.size:
-            return constants, noise_inside, smooth
-        # a drawing in flat greys: they are its classes
+        if noise_inside >= NOISY:  # else a drawing in flat greys: they are its classes
+            smooth = smoothed(levels, noise_inside, fixed)
+            if np.count_nonzero(smooth.support) >= LEFT * fixed.size:
+                return constants, noise_inside, smooth
     return [], noise, smoothed(levels, noise, None)
 
 
