@@ -61,6 +61,14 @@ NONSENSE_TEXTS: dict[str, list[Any]] = {
     "min_pixels": ["x", -1, 2.5, float("nan"), None],
     "min_length": ["x", -1, float("nan"), None],
     "drop": [3, [1.5], ["gold"], [77], None],
+    "keep": [3, [1.5], ["gold"], [77], None],
+    "marks": [3, [[1, 2]], [[[1]]]],
+    "fill_void": ["x", -1, 2.5, float("nan"), None],
+    "frame_size": ["x", -1, 0, float("nan"), [1]],
+    "sizes_between": ["x", 3, {1: 2}, {(0, 1): -1}, {(0, 1): "x"}, {(0, 77): 1}, {("gold", 0): 1}],
+    "step": ["x", 0, -1, (1, 2, 3), (1, 0), float("nan"), None],
+    "join": ["x", -1, float("nan"), [1]],
+    "tolerance": ["x", -1, float("nan"), float("inf"), None, [1]],
 }
 
 
@@ -74,9 +82,7 @@ def cases() -> Iterator[Any]:
 @pytest.mark.parametrize(("call", "parameter"), list(cases()))
 def test_nonsense_is_refused_by_name(call: Callable[..., Any], parameter: Parameter) -> None:
     name = parameter.field
-    table = NONSENSE_TEXTS[name] if parameter.kind == "String" else NONSENSE[parameter.kind]
-    if parameter.field.startswith("min_"):
-        table = NONSENSE_TEXTS[name]
+    table = NONSENSE_TEXTS.get(name) or NONSENSE[parameter.kind]
     if call is CALLS["generate_quad_mesh_from_material_boundaries"]:
         table = [bad for bad in table if bad is not None]
     if name == "drop" and call is CALLS["delete_material_from_image"]:
