@@ -1,10 +1,10 @@
 from .areas import enclosed_areas
 from .extraction import extract_boundaries
+from .oblong_pixels import TrueShape, true_shape
 from .options import ExtractionOptions, SmoothingOptions
 from .periodic import DIRECTIONS, match_opposite_sides, rematch
 from .smoothing import smooth_boundaries
 from .stairs import Step, as_step, find_step
-from .true_shape import TrueShape, true_shape
 
 __all__ = [
     "DIRECTIONS",

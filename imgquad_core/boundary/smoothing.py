@@ -25,10 +25,10 @@ from .fitting import WINDOWS, fit_pieces
 from .joins import join_short_chains
 from .junctions import place_junctions
 from .nodes import Nodes
+from .oblong_pixels import stretch
 from .options import SmoothingOptions
 from .sharp_corners import beside_corners, find_corners, place_corners
 from .stairs import Step, as_step, find_step, in_data_points
-from .true_shape import stretch
 from .withdrawal import Draft, place_freely, restore_areas_freely
 
 _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign points that both move it cannot meet

@@ -39,7 +39,7 @@ WAYS: dict[str, Callable[[Any], Any]] = {
 def values() -> list[Any]:
     made = run(LABELS, MeshOptions(size=3, periodic="xy"))
     elements = make_elements(made.mesh, ElementOptions(order=2, cohesive="all", periodic="xy"))
-    ledger = material_ledger(made.picture, made.labels, made.boundary, made.mesh, 1.0)
+    ledger = material_ledger(made.picture, made.labels, made.boundary, made.mesh, (1.0, 1.0))
     others = (elements, quality_report(made.mesh), region_errors(made.boundary), made.options.segmentation())
     stages = (made.options.smoothing(None), made.options.meshing(None), made.options.noise(True, (9, 9)))
     return [made, made.mesh, made.boundary, made.labels, made.labels.materials, *ledger, *others, *stages, *OPTIONS]

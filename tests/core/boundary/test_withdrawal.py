@@ -9,9 +9,9 @@ from imgquad_core.arrays import Floats
 from imgquad_core.boundary.curves import curves_of
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.nodes import Nodes, number_nodes, place_nodes, points_at
+from imgquad_core.boundary.oblong_pixels import stretch
 from imgquad_core.boundary.options import SmoothingOptions
 from imgquad_core.boundary.smoothing import smooth_boundaries
-from imgquad_core.boundary.true_shape import stretch
 from imgquad_core.boundary.withdrawal import Draft, Patience, _least_segments, _with_neighbours, place_freely
 from imgquad_core.geometry.conflicts import UNITS, snapped
 from support.labels import label_image, voronoi
