@@ -22,6 +22,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.geometry.conflicts import CROSSING, UNITS, find_conflicts
 from imgquad_core.jit import kernel
 from imgquad_core.model import BoundaryGraph, PointKind
 
@@ -122,8 +123,17 @@ def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
     is_closed = graph.chain_points[graph.chain_offsets[:-1]] == graph.chain_points[graph.chain_offsets[1:] - 1]
     is_closed &= chains.side[graph.chain_offsets[:-1]] != PIXEL_CORNER
     begin, end = runs.begin / size, runs.end / size
-    raw, side, offsets = _draw(runs.chain, begin, end, runs.axis, number, is_closed)
-    return PixelChains(_graph(graph, raw, offsets, is_closed, size), side)
+    stays = np.zeros(graph.n_chains, bool)
+    while True:  # chains with finer detail than a data point may cross where bends are cut: these keep their pixels
+        sides = np.where(stays[runs.chain], np.rint(runs.length).astype(np.int64), number)
+        raw, side, offsets = _draw(runs.chain, begin, end, runs.axis, sides, is_closed)
+        made = _graph(graph, raw, offsets, is_closed, size)
+        chain = np.repeat(np.arange(len(stays)), np.diff(offsets) - 1)
+        marks = find_conflicts(made.points, made.segments, chain, ~stays, made.shape, UNITS * size)
+        bad = np.unique(chain[marks >= CROSSING])
+        if stays[bad].all():
+            return PixelChains(made, side)
+        stays[bad] = True
 
 
 def _graph(graph: BoundaryGraph, raw: Floats, offsets: Ints, is_closed: Flags, size: Floats) -> BoundaryGraph:
