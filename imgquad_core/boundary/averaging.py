@@ -3,8 +3,9 @@
 Each chain is averaged by a bell as wide, turned about its ends, and sampled anew at every three quarters
 of it. Coordinates are then counted in widths: what smooths stairs of a pixel afterwards smooths these.
 
-No point goes farther than a share of the distance to foreign parts, and chains that cross others all the same keep
-their points: thin parts stay as they are.
+Chains keep their points where any of these, or the new chain beside it, would be farther off than a share of the
+distance to foreign parts: so none jumps over an island. Those that cross others all the same keep theirs, too, and
+those of regions that would be turned inside out: thin parts stay as they are.
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ from imgquad_core.geometry.conflicts import CROSSING, find_conflicts, snapped
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import PointKind
 
+from .areas import enclosed_areas
 from .curves import ELSEWHERE, PIXEL_CORNER, Curves, PixelChains, curves_of, numbered
 from .feature_size import local_feature_size
 
 _BELL = 1.05  # of the width, deviation of the bell
+_REACH = 4.0  # widths, in which foreign parts are looked for
+_SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are
 _ENDS = 3.0  # deviations to either side
 _EVERY = 0.75  # of the width, from sample to sample along the stairs
 _ROOM = 0.49  # of the distance to foreign parts: two points that both go that far do not meet
@@ -46,8 +50,8 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
         The same chains, coordinates and picture divided by `width`.
     """
     curves, ends = curves_of(*chains)
-    room = _ROOM * local_feature_size(curves.raw, curves, width, _ARC_RATIO)
-    stays = np.zeros(len(curves.ends), bool)
+    room = _ROOM * local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
+    stays = _strays(curves, room, *_sample(curves, room, np.zeros(len(curves.ends), bool), width))
     while True:
         raw, offsets = _sample(curves, room, stays, width)
         ids = numbered(offsets, curves.ends, len(ends.place))
@@ -66,7 +70,8 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
         )
         chain = np.repeat(np.arange(len(stays)), np.diff(offsets) - 1)
         marks = find_conflicts(points, graph.segments, chain, ~stays, graph.shape, units * width)
-        bad = np.unique(chain[marks >= CROSSING])
+        turned = np.append(enclosed_areas(graph) <= 0.0, False)[graph.chain_regions].any(axis=1)
+        bad = np.unique(np.concatenate([chain[marks >= CROSSING], np.flatnonzero(turned)]))
         if stays[bad].all():
             return PixelChains(graph, _sides(offsets, curves.ends[:, 0] >= 0))
         stays[bad] = True
@@ -113,6 +118,23 @@ def _sample(curves: Curves, room: Floats, stays: Flags, width: float) -> tuple[F
                 x, y = x + share * (ax - x), y + share * (ay - y)
             raw[begin + k, 0], raw[begin + k, 1] = x, y
     return raw, offsets
+
+
+@kernel
+def _strays(curves: Curves, room: Floats, raw: Floats, offsets: Ints) -> Flags:
+    """Tell which chains have a point farther from the new chain, at the same share of its length, than its room."""
+    found = np.zeros(len(offsets) - 1, np.bool_)
+    for c in range(len(found)):
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        begin, n = offsets[c], offsets[c + 1] - offsets[c] - 1
+        found[c] = curves.ends[c, 0] < 0 and last - first < _SHORTEST_LOOP
+        for i in range(first, last + 1):
+            t = n * curves.arc[i] / curves.arc[last]
+            k = min(int(t), n - 1)
+            x = raw[begin + k, 0] + (t - k) * (raw[begin + k + 1, 0] - raw[begin + k, 0])
+            y = raw[begin + k, 1] + (t - k) * (raw[begin + k + 1, 1] - raw[begin + k, 1])
+            found[c] |= np.hypot(x - curves.raw[i, 0], y - curves.raw[i, 1]) > room[i]
+    return found
 
 
 @verb

@@ -20,6 +20,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
+from scipy.spatial import cKDTree
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.conflicts import CROSSING, UNITS, find_conflicts
@@ -123,7 +124,7 @@ def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
     is_closed = graph.chain_points[graph.chain_offsets[:-1]] == graph.chain_points[graph.chain_offsets[1:] - 1]
     is_closed &= chains.side[graph.chain_offsets[:-1]] != PIXEL_CORNER
     begin, end = runs.begin / size, runs.end / size
-    stays = np.zeros(graph.n_chains, bool)
+    stays = _swallow(chains, runs, runs.length / number)
     while True:  # chains with finer detail than a data point may cross where bends are cut: these keep their pixels
         sides = np.where(stays[runs.chain], np.rint(runs.length).astype(np.int64), number)
         raw, side, offsets = _draw(runs.chain, begin, end, runs.axis, sides, is_closed)
@@ -134,6 +135,28 @@ def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
         if stays[bad].all():
             return PixelChains(made, side)
         stays[bad] = True
+
+
+def _swallow(chains: PixelChains, runs: _Runs, side: Floats) -> Flags:
+    """Tell which chains would leave out points of others where their bends are cut, between the middles of sides."""
+    found = np.zeros(chains.graph.n_chains, bool)
+    bend = np.flatnonzero(runs.chain[1:] == runs.chain[:-1])
+    corner, legs = runs.end[bend], 0.5 * np.stack([side[bend], side[bend + 1]], axis=1)
+    is_cut = legs.max(axis=1) > 0.5
+    if not is_cut.any() or (runs.length >= _SHORT * side.max()).all():
+        return found  # no detail is finer than a data point
+    back, ahead = (_unit(runs, at) for at in (bend, bend + 1))
+    points = chains.graph.points
+    tree = cKDTree(points)
+    for k in np.flatnonzero(is_cut).tolist():
+        near = points[tree.query_ball_point(corner[k], legs[k].max())] - corner[k]
+        u, v = -near @ back[k] / legs[k, 0], near @ ahead[k] / legs[k, 1]
+        found[runs.chain[bend[k]]] |= bool(((u > 0) & (v > 0) & (u + v < 1)).any())
+    return found
+
+
+def _unit(runs: _Runs, at: Ints) -> Floats:
+    return np.asarray((runs.end[at] - runs.begin[at]) / runs.length[at, None])
 
 
 def _graph(graph: BoundaryGraph, raw: Floats, offsets: Ints, is_closed: Flags, size: Floats) -> BoundaryGraph:
