@@ -5,7 +5,7 @@ of it. Coordinates are then counted in widths: what smooths stairs of a pixel af
 
 Chains keep their points where any of these, or the new chain beside it, would be farther off than a share of the
 distance to foreign parts: so none jumps over an island. Those that cross others all the same keep theirs, too, and
-those of regions that would be turned inside out: thin parts stay as they are.
+those that would leave a node in another order, or turn a region inside out: thin parts stay as they are.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from imgquad_core.model import PointKind
 from .areas import enclosed_areas
 from .curves import ELSEWHERE, PIXEL_CORNER, Curves, PixelChains, curves_of, numbered
 from .feature_size import local_feature_size
+from .joins import rings
 
 _BELL = 1.05  # of the width, deviation of the bell
 _REACH = 4.0  # widths, in which foreign parts are looked for
@@ -52,6 +53,7 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
     curves, ends = curves_of(*chains)
     room = _ROOM * local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
     stays = _strays(curves, room, *_sample(curves, room, np.zeros(len(curves.ends), bool), width))
+    order, _ = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
     while True:
         raw, offsets = _sample(curves, room, stays, width)
         ids = numbered(offsets, curves.ends, len(ends.place))
@@ -71,6 +73,8 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
         chain = np.repeat(np.arange(len(stays)), np.diff(offsets) - 1)
         marks = find_conflicts(points, graph.segments, chain, ~stays, graph.shape, units * width)
         turned = np.append(enclosed_areas(graph) <= 0.0, False)[graph.chain_regions].any(axis=1)
+        ring, _ = rings(points[ids], offsets, ends.offsets, ends.sockets)
+        turned |= (ring != order).reshape(-1, 2).any(axis=1)
         bad = np.unique(np.concatenate([chain[marks >= CROSSING], np.flatnonzero(turned)]))
         if stays[bad].all():
             return PixelChains(graph, _sides(offsets, curves.ends[:, 0] >= 0))

@@ -100,7 +100,7 @@ def join_short_chains(chains: PixelChains, shortest: float, farthest: float, uni
     if shortest <= 0.0 or not len(candidates):
         return Joined(chains, 0)
     forbidden = np.zeros(len(curves.ends), bool)
-    ring, first = _rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
+    ring, first = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
     rank = _ranks(ends.place, ends.kind, chains.graph.shape)
     grid = _grid_of(curves.raw, chains.graph.shape, max(shortest, 2.0))
     chain = np.repeat(np.arange(len(curves.ends)), np.diff(curves.offsets))
@@ -139,7 +139,7 @@ def _short(raw: Floats, offsets: Ints, ends: Ints, shortest: float) -> Ints:
     return np.flatnonzero(near & (ends[:, 0] >= 0) & (ends[:, 0] != ends[:, 1]) & (points <= 8.0 * shortest + 8.0))
 
 
-def _rings(raw: Floats, offsets: Ints, node_offsets: Ints, sockets: Ints) -> tuple[Ints, Ints]:
+def rings(raw: Floats, offsets: Ints, node_offsets: Ints, sockets: Ints) -> tuple[Ints, Ints]:
     """Return the next socket round its node for each socket, and one socket of each node."""
     chain, is_end = sockets // 2, sockets % 2 == 1
     at = np.where(is_end, offsets[chain + 1] - 1, offsets[chain])
@@ -581,7 +581,7 @@ def _nodes_in_conflict(chains: PixelChains, net: _Net, which: Ints, units: Float
 def _changed_order(chains: PixelChains, net: _Net, which: Ints) -> Flags:
     """Tell which chains leave a node in another order than they did."""
     curves, ends = curves_of(*chains)
-    ring, _ = _rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
+    ring, _ = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
     new = np.full(len(net.gone), -1, np.int64)
     new[which] = np.arange(len(which))
     old = (2 * which[:, None] + [0, 1]).ravel()
