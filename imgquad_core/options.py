@@ -83,8 +83,14 @@ class MeshOptions:
         Whether pixels of alpha 0 are left out too.
     crop : tuple of int, optional
         Left, upper, right, lower bound of the part that is meshed, from the picture's upper left corner.
-    frame, channel, level, scalars
-        Which picture of a file that holds several; see `ReadOptions`.
+    frame : int, optional
+        Which picture of a stack, counted from 0; see `ReadOptions`.
+    channel : int, optional
+        Which channel of a picture that has several, counted from 0.
+    level : int
+        Which level of a pyramid: 0 is the finest.
+    scalars : str, optional
+        Which array of a file that holds several.
     info_bar : "keep" or "crop"
         What becomes of the bar with text below an electron micrograph.
     grain_angle : float

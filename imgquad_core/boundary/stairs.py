@@ -39,6 +39,7 @@ _ALIKE, _LEAST_MEAN = 0.6, 1.25  # share of the steps of the width, and its leas
 _SHORT, _FEW_SHORT = 0.6, 0.02  # of the width; share of runs below it, at most
 _CLEAR, _OFF = 0.6, 1.0  # least height of the peak, and its distance in px from the mean step
 _HEX_LEAST, _HEX_OFF, _HEX_CLEAR = 2.0, 0.03, 0.2  # least distance of rows, px; off sqrt(3) at most; height there
+_HEX_RUNS = 60  # across an axis: the few of some rectangles have periods by chance
 _WHOLE = 0.004  # a period this near a whole number, relative, is that number
 
 #: width and height of data points, in pixels
@@ -58,6 +59,7 @@ class _Runs(NamedTuple):
 class _Spectrum(NamedTuple):
     height: Floats  # of frequencies 0, 1, 2, ... over `number`, from 0 to 1
     number: int
+    runs: int = 0  # straight runs that it was made of
 
 
 class _Peak(NamedTuple):
@@ -150,7 +152,7 @@ def _swallow(chains: PixelChains, runs: _Runs, side: Floats) -> Flags:
     tree = cKDTree(points)
     for k in np.flatnonzero(is_cut).tolist():
         near = points[tree.query_ball_point(corner[k], legs[k].max())] - corner[k]
-        u, v = -near @ back[k] / legs[k, 0], near @ ahead[k] / legs[k, 1]
+        u, v = -(near * back[k]).sum(axis=1) / legs[k, 0], (near * ahead[k]).sum(axis=1) / legs[k, 1]
         found[runs.chain[bend[k]]] |= bool(((u > 0) & (v > 0) & (u + v < 1)).any())
     return found
 
@@ -261,12 +263,13 @@ def _spectrum(runs: _Runs, axis: int, is_inner: Flags) -> _Spectrum:
     if weight.sum() < _FEWEST_SIDES or span == 0:
         return _Spectrum(np.zeros(1), 1)
     number = _FINENESS * span
-    return _Spectrum(np.abs(np.fft.rfft(np.bincount(place - place.min(), weight), number)) / weight.sum(), number)
+    height = np.abs(np.fft.rfft(np.bincount(place - place.min(), weight), number)) / weight.sum()
+    return _Spectrum(height, number, len(place))
 
 
 def _peak(spectrum: _Spectrum, least: float) -> _Peak:
     """Find the longest clear period, of at least that height."""
-    height, number = spectrum
+    height, number = spectrum.height, spectrum.number
     low, high = int(np.ceil(number / min(_LONGEST, number / _FINENESS / 4))), len(height) - 1
     if low >= high:
         return _NO_PEAK
@@ -281,6 +284,8 @@ def _hexagon(along: _Spectrum, up: _Spectrum) -> float | None:
 
     Their upright sides are half a width apart, sqrt(3) times as near as their rows.
     """
+    if min(along.runs, up.runs) < _HEX_RUNS:
+        return None
     row, column = _peak(up, _PEAK), _peak(along, _HEX_CLEAR)
     if row.height < _CLEAR or row.period <= _HEX_LEAST or abs(row.period / column.period - np.sqrt(3.0)) > _HEX_OFF:
         return None

@@ -83,9 +83,9 @@ def _least_absolute(matrix: Floats, wanted: Floats, smallest: float) -> Floats:
     for _ in range(ROUNDS):
         weighted = matrix * weights[:, None]
         # a small ridge keeps pictures of one row or of few flat places determined
-        normal = weighted.T @ matrix + 1e-9 * weights.sum() * np.eye(matrix.shape[1])
-        found = np.linalg.solve(normal, weighted.T @ wanted)
-        weights = 1.0 / np.maximum(np.abs(matrix @ found - wanted), smallest)
+        normal = np.einsum("ij,ik->jk", weighted, matrix) + 1e-9 * weights.sum() * np.eye(matrix.shape[1])
+        found = np.linalg.solve(normal, np.einsum("ij,i->j", weighted, wanted))
+        weights = 1.0 / np.maximum(np.abs(np.einsum("ij,j->i", matrix, found) - wanted), smallest)
     return np.asarray(found)
 
 

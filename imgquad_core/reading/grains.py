@@ -226,7 +226,7 @@ def _mean(turns: Floats, laue: str) -> Floats:
     mean = turns[0]
     for _ in range(2):
         alike = _nearest(turns, mean, laue)
-        mean = np.linalg.eigh(alike.T @ alike)[1][:, -1]
+        mean = np.linalg.eigh(np.einsum("ij,ik->jk", alike, alike))[1][:, -1]
     return np.asarray(mean * (-1.0 if mean[np.argmax(np.abs(mean))] < 0 else 1.0))
 
 

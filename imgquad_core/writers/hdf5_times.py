@@ -44,7 +44,9 @@ def _erase_in_header(data: mmap.mmap, start: int) -> None:
 def _lookup3(data: bytes) -> int:
     """Bob Jenkins' hash of 32 bits, with the initial value 0."""
     a = b = c = (0xDEADBEEF + len(data)) & _MASK
-    last = max(len(data) - 1, 0) // 12 * 12
+    if not data:
+        return c
+    last = (len(data) - 1) // 12 * 12
     for at in range(0, last, 12):
         x, y, z = struct.unpack_from("<3I", data, at)
         a, b, c = _mixed((a + x) & _MASK, (b + y) & _MASK, (c + z) & _MASK)

@@ -13,8 +13,19 @@ import imgquad_core
 SOURCES = sorted(Path(imgquad_core.__file__).parent.rglob("*.py"))
 #: by NumPy: BLAS or LAPACK; norms along an axis are plain sums, einsum without `optimize` too
 OF_BLAS = {"dot", "vdot", "inner", "matmul", "tensordot", "multi_dot", "lstsq", "solve", "inv", "eig", "eigh", "svd"}
-#: SciPy's sparse matrices have loops of their own; one 3 x 3 matrix
-ALLOWED = {("areas.py", "matrix @ direction"), ("quantisation.py", "np.linalg.eigh(")}
+#: SciPy's sparse matrices have loops of their own; single matrices of 3, 4 and 9 rows; sums over four numbers, which
+#: no thread cuts; whole numbers
+ALLOWED = {
+    ("areas.py", "matrix @ direction"),
+    ("sets.py", "of.tocsr() @ on.tocsr()"),
+    ("quantisation.py", "np.linalg.eigh("),
+    ("grains.py", "np.linalg.eigh("),
+    ("shading.py", "np.linalg.solve("),
+    ("grains.py", "turn @ other"),
+    ("grains.py", "between @ crystal_symmetries(laue).T"),
+    ("grains.py", "between @ symmetries.T"),
+    ("info_bar.py", "row.astype(np.int64) @ "),
+}
 
 SMOOTHED = """
 import hashlib

@@ -236,7 +236,7 @@ def test_texts_are_read_and_written_back() -> None:
         "crop": "1,2,30,40",
     }
     made = options_from(options, spec, values)
-    assert made.colors == [(255, 0, 0), (0, 255, 10)]
+    assert made.colors == ((255, 0, 0), (0, 255, 10))
     assert (made.min_pixels, made.min_length, made.boundary_size) == (12, 7.25, 1.3)
     assert made.material_sizes == {"quartz": 2.5, "a, b": 1.0}
     assert (made.drop, made.crop) == (("pore", "a, b"), (1, 2, 30, 40))

@@ -129,3 +129,10 @@ def test_a_disc_of_wide_data_points_is_round() -> None:
 def test_one_number_is_both_sides() -> None:
     assert as_step(3) == (3.0, 3.0)
     assert as_step((3, 2.5)) == (3.0, 2.5)
+
+
+def test_a_few_rectangles_are_no_hexagons() -> None:
+    labels = np.zeros((24, 30), np.int32)
+    labels[6:18, 8:20] = 3
+    labels[1:5, 1:6] = 5
+    assert find_step(extract_boundaries(label_image(labels))) == (1.0, 1.0)

@@ -73,13 +73,13 @@ BAD_PICTURES: dict[str, tuple[Callable[[Path], Path], str]] = {
     "not a picture": (file("text.png", b"not a picture at all"), "text.png"),
     "cut off": (cut_off, "cut.png"),
     "zero pixels": (array(LABELS[:0]), "pixels"),
-    "nan": (array(np.where(LABELS == 3, np.nan, 1.0)), "nan"),
+    "nan everywhere": (array(np.full(LABELS.shape, np.nan)), "nan"),
     "stack": (array(np.stack([LABELS] * 9)), "stack"),
     "strings": (array([["a", "b"]]), "array.npy"),
     "stack of pages": (tiff_stack, "stack"),
     "no vti": (file("broken.vti", b"<VTKFile"), "broken.vti"),
     "cut off vti": (cut_off_vti, "image.vti"),
-    "vti without data": (image_data((4, 4, 1), False), "No data"),
+    "vti without data": (image_data((4, 4, 1), False), "an array of labels"),
     "vti volume": (image_data((4, 4, 4), True), "stack"),
     "decompression bomb": (bomb, "max_pixels"),
 }
@@ -187,7 +187,7 @@ def test_bad_output(case: str, flag: str, picture: Path, kept: Path, capfd: Capt
 def test_two_outputs_of_one_name(picture: Path, tmp_path: Path, capfd: Capture) -> None:
     same = str(tmp_path / "same.png")
     assert refused(["run", str(picture), str(tmp_path / "m.vtu"), "--labels-out", same, "--picture", same]) == 2
-    assert "one name" in capfd.readouterr().err
+    assert "two outputs are one file" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["mesh.vtu", "mesh.vtk", "mesh.vtkhdf", "mesh.inp"])
@@ -203,7 +203,9 @@ def test_full_disk_for_a_second_output(flag: str, picture: Path, tmp_path: Path)
     option, name = flag.split("=")
     kept = tmp_path / name
     kept.write_text("as before")
-    done = run_limited(["run", str(picture), str(tmp_path / "m.vtu"), option, str(kept), "--quiet"], most_bytes=1000)
+    # the mesh comes first, and fits
+    args = ["run", str(picture), str(tmp_path / "m.obj"), option, str(kept), "--size", "30", "--quiet"]
+    done = run_limited(args, most_bytes=3000)
     assert_refused(done.returncode, done.stderr.splitlines()[-1] + "\n", name, kept)
 
 

@@ -12,7 +12,7 @@ from PIL import Image
 
 from imgquad_mesh.__main__ import main
 
-SECONDS = ["read", "segment", "denoise", "boundary", "smooth", "mesh", "write", "total"]
+SECONDS = ["read", "segment", "denoise", "absorb", "boundary", "smooth", "mesh", "write", "total"]
 
 
 def disc_labels() -> np.ndarray:
