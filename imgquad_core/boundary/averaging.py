@@ -11,6 +11,7 @@ those that would leave a node in another order, or turn a region inside out: thi
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,9 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
     curves, ends = curves_of(*chains)
     room = _ROOM * local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
     stays = _strays(curves, room, *_sample(curves, room, np.zeros(len(curves.ends), bool), width))
+    # as the points are rounded, so that what lies on the border lies on it exactly
+    cols, rows = snapped(np.array(chains.graph.shape[::-1]) / width, units * width).tolist()
+    shape: Any = (rows, cols)
     order, _ = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
     while True:
         raw, offsets = _sample(curves, room, stays, width)
@@ -68,7 +72,7 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
             point_kind=kind,
             chain_offsets=offsets,
             chain_points=ids,
-            shape=tuple((np.array(chains.graph.shape) / width).tolist()),
+            shape=shape,
         )
         chain = np.repeat(np.arange(len(stays)), np.diff(offsets) - 1)
         marks = find_conflicts(points, graph.segments, chain, ~stays, graph.shape, units * width)

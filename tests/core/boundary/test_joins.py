@@ -71,7 +71,7 @@ def test_grains_keep_their_faces_and_no_node_goes_far(seed: int, shortest: float
     check_planar(made, 1)
     assert made.n_chains < raw.n_chains
     nodes = raw.points[raw.point_kind == PointKind.JUNCTION]
-    now = made.points[made.point_kind == PointKind.JUNCTION]
+    now = made.points[(made.point_kind == PointKind.JUNCTION) | (made.point_kind == PointKind.CORNER)]
     nearest = np.hypot(*(nodes[:, None] - now[None]).transpose(2, 0, 1)).min(axis=1)
     assert nearest.max() <= max(0.5 * shortest, 1.0) + 1e-3
 
