@@ -104,19 +104,16 @@ def to_unit(shape: tuple[int, int], r: NDArray[Any], c: NDArray[Any]) -> tuple[S
     )
 
 
-def levels_of(picture: Picture, void: Flags | None, in_color: bool = False) -> Levels:
+def levels_of(picture: Picture, void: Flags | None) -> Levels:
     """Return a picture's levels: bytes as they are, all else stretched from its range; grey stored as RGB is grey."""
     values = picture.values if picture.palette is None else picture.palette[picture.values]
     if values.ndim == 3:
         rgb = values if values.dtype == np.uint8 else (values >> 8).astype(np.uint8)
-        if in_color or (rgb[..., 0] != rgb[..., 1]).any() or (rgb[..., 0] != rgb[..., 2]).any():
+        if (rgb[..., 0] != rgb[..., 1]).any() or (rgb[..., 0] != rgb[..., 2]).any():
             return Levels(filled(np.ascontiguousarray(rgb), void), void=void)
         values = rgb[..., 0]
     values = filled(values[..., None], void)
     low, step = (0.0, 1.0) if values.dtype == np.uint8 else _range(values[..., 0])
-    if in_color:
-        bytes_ = np.rint(np.clip((values - low) / step, 0.0, 255.0)).astype(np.uint8)
-        return Levels(np.repeat(bytes_, 3, axis=2), void=void)
     return Levels(values, low, step, void)
 
 

@@ -23,6 +23,8 @@ from .tails import tails_of
 RIM, RIM_OF_NOISE = 16.0, 16.0
 #: pixels of larger gradient (levels, or standard deviations of the noise) are on a slope; three channels add up
 SLOPE, OF_COLOUR = 2.0, 1.7
+#: ... of greys without noise: the feet of blurred edges are no class beside the grey that they rise to
+FOOT = 1.0
 #: shading is taken out if it ranges over more standard deviations of the noise, and separates classes better so much
 SHADED, BETTER = 2.0, 1.25
 #: constants count if at least so much of the picture is flat beside them
@@ -142,6 +144,8 @@ def find_nearest(levels: Levels, palette: Floats) -> Found:
     """Give each pixel the nearest of given colours, shape (n, 3), in CIELAB."""
     noise = noise_of(levels)
     smooth = smoothed(levels, noise, None)
+    if levels.is_grey:  # only now: three equal channels would make steps and rims of its noise 1.7 times as high
+        smooth = smooth._replace(plane=np.repeat(smooth.plane, 3, axis=2))
     classes = Classes(palette, np.zeros(0, np.int32), np.inf, 0.0, "nearest of the palette")
     return _labelled(Choice(levels, smooth, classes), palette, [], noise, 0)
 
@@ -150,7 +154,8 @@ def smoothed(levels: Levels, noise: float, without: Flags | None) -> Smooth:
     """Take noise away and tell rims and slopes from what is flat; pixels `without` and void are no support."""
     plane = np.empty((*levels.shape, levels.values.shape[2]), np.uint8)
     gentle = np.empty(levels.shape, np.bool_)
-    bound = max(SLOPE, noise) * (1.0 if levels.is_grey else OF_COLOUR)
+    drawn = levels.is_grey and noise < NOISY
+    bound = FOOT if drawn else max(SLOPE, noise) * (1.0 if levels.is_grey else OF_COLOUR)
     for strip in filtered_strips(levels, noise):
         plane[strip.place] = np.rint(np.clip(strip.shades[strip.own], 0.0, 255.0))
         gentle[strip.place] = squared_gradient(strip.shades)[strip.own] <= bound**2

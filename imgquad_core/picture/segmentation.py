@@ -196,7 +196,7 @@ def _divided(
 
 def _nearest(picture: Picture, palette: Floats, void: Flags | None) -> Segmentation:
     """Give each pixel the nearest colour of a palette."""
-    return _told(find_nearest(levels_of(picture, void, in_color=True), palette), void, ())
+    return _told(find_nearest(levels_of(picture, void), palette), void, ())
 
 
 def _told(found: Found, void: Flags | None, warnings: tuple[str, ...]) -> Segmentation:
