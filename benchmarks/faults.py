@@ -266,7 +266,7 @@ def options(rng: Generator, folder: Path) -> None:
 def readers(rng: Generator, folder: Path) -> None:
     """A file of each kind that is read, damaged at random: it is read, or one `InputError`."""
     from imgquad_core.errors import InputError
-    from imgquad_core.picture import ReadOptions, read_picture
+    from imgquad_core.reading import ReadOptions, read_picture
     from imgquad_mesh.datasets.vtk_files import read_vtk
     from imgquad_mesh.meshlab.mlx import read_script
 

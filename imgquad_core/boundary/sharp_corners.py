@@ -22,7 +22,8 @@ _TURN, _TIP = 0.8, 2.5  # radians, least and largest turn between the sides; bey
 _UNLIKE = 0.20  # px, least residual of one quadratic through both sides
 _FARTHEST = 2.0  # px from the pixel boundary
 _APART = 4.2  # px of arc between corners
-_MOST = 99  # samples on both sides of a point: these are half a pixel apart or more
+_BESIDE = 12  # samples on each side of a point of a closed chain
+_ROUND = 2 * _BESIDE + 2
 _AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
 
 
@@ -96,7 +97,10 @@ def _mark_side(curves: Curves, c: int, i: int, step: int, is_corner: Flags, corn
 def _find(curves: Curves, lengths: Floats) -> Flags:
     score = np.zeros(len(curves.raw))
     is_corner = np.zeros(len(curves.raw), np.bool_)
-    beside, sums = Samples(np.empty(_MOST), np.empty(_MOST), np.empty(_MOST), np.full(_MOST, 1.0)), np.empty(14)
+    most = _ROUND  # samples on both sides of a point: all those of its chain if need be
+    for c in range(len(curves.ends)):
+        most = max(most, curves.offsets[c + 1] - curves.offsets[c] + 2)
+    beside, sums = Samples(np.empty(most), np.empty(most), np.empty(most), np.full(most, 1.0)), np.empty(14)
     for c in range(len(curves.ends)):
         if curves.is_frame[c]:
             continue
@@ -156,7 +160,7 @@ def _gather(curves: Curves, c: int, i: int, out: Samples) -> int:
         while high < last and curves.arc[high] - curves.arc[i] < _SIDE:
             high += 1
     else:
-        low, high = i - 12, i + 12
+        low, high = i - _BESIDE, i + _BESIDE
     n, length = last - first, curves.arc[last]
     for k in range(low, high + 1):
         j = first + (k - first) % n if curves.ends[c, 0] < 0 else k

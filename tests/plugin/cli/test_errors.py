@@ -205,7 +205,7 @@ def test_full_disk_for_a_second_output(flag: str, picture: Path, tmp_path: Path)
     kept.write_text("as before")
     # the mesh comes first, and fits
     args = ["run", str(picture), str(tmp_path / "m.obj"), option, str(kept), "--size", "30", "--quiet"]
-    done = run_limited(args, most_bytes=3000)
+    done = run_limited(args, most_bytes=2000)
     assert_refused(done.returncode, done.stderr.splitlines()[-1] + "\n", name, kept)
 
 
