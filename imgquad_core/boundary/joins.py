@@ -22,7 +22,7 @@ import numpy as np
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.geometry.conflicts import CROSSING, UNITS, find_conflicts, snapped
 from imgquad_core.jit import kernel, verb
-from imgquad_core.model import PointKind
+from imgquad_core.model import VOID, PointKind
 
 from .curves import ELSEWHERE, PIXEL_CORNER, PixelChains, curves_of, numbered
 
@@ -54,12 +54,14 @@ class _Net(NamedTuple):
     raw: Floats
     offsets: Ints
     is_frame: Flags
+    is_outer: Flags  # (n_chains,) on the border of what is meshed: the picture's, or that of void pixels
     node: Ints  # (n_chains, 2) node at either end
     kept: Ints  # (n_chains, 2) first and last dense point that is kept, without the nodes
     gone: Flags  # (n_chains,)
     next: Ints  # (2 * n_chains,) next socket round the node
     socket: Ints  # (n_nodes,) one socket of each node
     rank: Ints  # (n_nodes,) 0 inside the picture, 1 on its border, 2 its corner
+    on_outer: Flags  # (n_nodes,) at the end of such a chain
     place: Floats  # (n_nodes, 2)
     old: Floats  # (n_nodes, 2) where the node was before
     other: Ints  # (n_nodes,) next one of the nodes that became this one, a ring
@@ -102,6 +104,9 @@ def join_short_chains(chains: PixelChains, shortest: float, farthest: float, uni
     forbidden = np.zeros(len(curves.ends), bool)
     ring, first = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
     rank = _ranks(ends.place, ends.kind, chains.graph.shape)
+    is_outer = (chains.graph.chain_regions == VOID).any(axis=1)
+    on_outer = np.zeros(len(rank), bool)
+    on_outer[np.repeat(np.arange(len(rank)), np.diff(ends.offsets))[is_outer[ends.sockets // 2]]] = True
     grid = _grid_of(curves.raw, chains.graph.shape, max(shortest, 2.0))
     chain = np.repeat(np.arange(len(curves.ends)), np.diff(curves.offsets))
     for attempt in range(_ATTEMPTS):
@@ -109,12 +114,14 @@ def join_short_chains(chains: PixelChains, shortest: float, farthest: float, uni
             curves.raw,
             curves.offsets,
             curves.is_frame,
+            is_outer,
             curves.ends.copy(),
             np.stack([curves.offsets[:-1] + 1, curves.offsets[1:] - 2], axis=1),
             np.zeros(len(curves.ends), bool),
             ring.copy(),
             first,
             rank.copy(),
+            on_outer.copy(),
             ends.place.copy(),
             ends.place,
             np.arange(len(ends.place)),
@@ -237,6 +244,8 @@ def _star(net: _Net, c: int, star: Ints) -> int:
     a, b = net.node[c, 0], net.node[c, 1]
     if (net.rank[a] == 2 and net.rank[b] == 2) or (net.rank[a] > 0 and net.rank[b] > 0 and not net.is_frame[c]):
         return 0
+    if net.on_outer[a] and net.on_outer[b] and not net.is_outer[c]:
+        return 0  # what is meshed would be cut in two there
     n = 0
     for side in range(2):
         s = net.next[2 * c + side]
@@ -499,6 +508,7 @@ def _join(net: _Net, c: int, star: Ints, n: int, x: float, y: float, reach: floa
     net.place[a, 0], net.place[a, 1], net.reach[a] = x, y, reach
     net.place[b, 0], net.place[b, 1], net.reach[b] = x, y, reach
     net.rank[a] = max(net.rank[a], net.rank[b])
+    net.on_outer[a] = net.on_outer[a] or net.on_outer[b]
     net.other[a], net.other[b] = net.other[b], net.other[a]  # two rings become one
     for k in range(n):
         net.next[star[k]] = star[(k + 1) % n]

@@ -21,7 +21,7 @@ from .vtk_files import EXTENSIONS, read_vtk
 
 
 def read_any(path: str | Path, options: ReadOptions | None = None) -> Picture:
-    """Read a picture from a file of any format that the command reads; see `imgquad_core.picture.read_picture`."""
+    """Read a picture from a file of any format that the command reads; see `imgquad_core.reading.read_picture`."""
     path, options = Path(path), options or ReadOptions()
     return read_vtk(path, options) if path.suffix.lower() in EXTENSIONS else read_picture(path, options)
 

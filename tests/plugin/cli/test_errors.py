@@ -73,7 +73,7 @@ BAD_PICTURES: dict[str, tuple[Callable[[Path], Path], str]] = {
     "not a picture": (file("text.png", b"not a picture at all"), "text.png"),
     "cut off": (cut_off, "cut.png"),
     "zero pixels": (array(LABELS[:0]), "pixels"),
-    "nan everywhere": (array(np.full(LABELS.shape, np.nan)), "nan"),
+    "nan everywhere": (array(np.full(LABELS.shape, np.nan)), "no finite number"),
     "stack": (array(np.stack([LABELS] * 9)), "stack"),
     "strings": (array([["a", "b"]]), "array.npy"),
     "stack of pages": (tiff_stack, "stack"),
