@@ -66,6 +66,8 @@ def write_run(run: Run, path: Path, elements: ElementOptions | None = None, **op
 
         put_calibration(grid, run.calibration, (run.options.pixel_sides, run.options.corner))
 
+    if run.calibration.size is None and (run.options.pixel_sides, run.options.corner) == ((1.0, 1.0), (0.0, 0.0)):
+        return write_mesh_file(run.mesh, path, elements, **options)  # pixels are all that is known
     return write_mesh_file(run.mesh, path, elements, add_place, **options)
 
 
