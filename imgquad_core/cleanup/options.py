@@ -1,4 +1,4 @@
-"""How far quads are cleaned up."""
+"""How far quads are cleaned up; the numbers of each effort of meshing are in `imgquad_core.mesher.efforts`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What our filters are: read from ``filters.xml``, MeshLab's own filter description vocabulary (MFI 2.0).
 
-``filters.xml`` is the one truth for names, types, defaults, limits and help. The checker of scripts, the command's
-options, the methods put on ``pymeshlab.MeshSet`` and the tables in docs/ come from here.
+``filters.xml`` names the filters, and tells scripts their parameters: tests hold these against the declarations of the
+core's options. The checker of scripts, the methods put on ``pymeshlab.MeshSet`` and the tables in docs/ come from here.
 """
 
 from __future__ import annotations
