@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import signal
 import tempfile
 from pathlib import Path
 
@@ -11,6 +12,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLES = Path(os.environ.get("IMGQUAD_SAMPLES", ROOT.parent / "shared" / "samples"))
+# where a shell starts the tests in the background, they and the commands that they start would ignore Ctrl-C
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 IMAGES = Path(os.environ.get("IMGQUAD_IMAGES", ROOT.parent / "shared" / "images"))
 
 
