@@ -264,40 +264,30 @@ def options(rng: Generator, folder: Path) -> None:
 
 
 def readers(rng: Generator, folder: Path) -> None:
-    """A file of each kind that is read, damaged at random: it is read, or one `InputError`."""
+    """A file of each format that is read, damaged at random: it is read, or one `InputError`."""
+    from support.files import WRITERS, assert_read_or_refused, damage
+
+    name = str(rng.choice([*WRITERS, "a.mlx"]))
+    if name == "a.mlx":
+        damaged_script(rng, folder / name)
+        return
+    file = WRITERS[name](folder / name)
+    damage(file, rng)
+    assert_read_or_refused(file)
+
+
+def damaged_script(rng: Generator, file: Path) -> None:
+    """Read a filter script, damaged at random."""
+    from imgquad_core import MeshOptions
     from imgquad_core.errors import InputError
-    from imgquad_core.reading import ReadOptions, read_picture
-    from imgquad_mesh.datasets.vtk_files import read_vtk
     from imgquad_mesh.meshlab.mlx import read_script
+    from imgquad_mesh.meshlab.templates import run_as_script
+    from support.files import damage
 
-    kind = str(rng.choice(["png", "tif", "bmp", "ppm", "gif", "jpg", "webp", "npy", "vti", "mlx"]))
-    file = folder / f"in.{kind}"
-    labels = rng.integers(0, 5, (20, 30), dtype=np.uint8)
-    if kind == "npy":
-        np.save(file, labels)
-    elif kind == "vti":
-        import pyvista as pv
-
-        image = pv.ImageData(dimensions=(31, 21, 1))
-        image.cell_data["label"] = labels.ravel()
-        image.save(file)
-    elif kind == "mlx":
-        from imgquad_core import MeshOptions
-        from imgquad_mesh.meshlab.templates import run_as_script
-
-        file.write_text(run_as_script(MeshOptions()), encoding="utf-8")
-    else:
-        Image.fromarray(labels).save(file)
-    data = bytearray(file.read_bytes())
-    for _ in range(int(rng.integers(1, 9))):
-        at = int(rng.integers(len(data)))
-        data[at] = int(rng.integers(256))
-    file.write_bytes(data[: int(rng.integers(1, len(data) + 1))] if rng.random() < 0.5 else data)
+    file.write_text(run_as_script(MeshOptions()), encoding="utf-8")
+    damage(file, rng)
     with suppress(InputError):
-        if kind == "vti":
-            read_vtk(file, ReadOptions(max_pixels=10_000))
-        else:
-            read_script(file) if kind == "mlx" else read_picture(file)
+        read_script(file)
 
 
 class Section(NamedTuple):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from imgquad_core.reading.grains import (
     product,
     quaternions_of,
 )
+from support.files import CTF, PHASES, ang_text, ctf_text, points_of, two_halves
 
 
 def random_turns(n: int, seed: int = 0) -> NDArray[np.float64]:
@@ -113,33 +113,6 @@ def test_the_mean_of_a_grain_does_not_mind_symmetric_twins_of_its_pixels() -> No
 
 # --------------------------------------------------------------------------------------------------- files
 
-PHASES = "# Phase 2\n# MaterialName \tFerrite\n# Symmetry  43\n# Phase 1\n# MaterialName  Quartz\n# Symmetry 32\n"
-
-
-def ang_text(points: NDArray[np.float64], header: str = PHASES) -> str:
-    rows = "\n".join(" ".join(f"{value:.5f}" for value in row[:7]) + f" {int(row[7])} 0 1.2" for row in points)
-    return f"# TEM_PIXperUM 1.0\n{header}# GRID: SqrGrid\n#\n{rows}\n"
-
-
-def points_of(
-    phase: NDArray[Any], euler: NDArray[Any], step: float = 0.25, hexagonal: bool = False
-) -> NDArray[np.float64]:
-    rows, cols = np.indices(phase.shape)
-    x = cols * step + (rows % 2) * (step / 2 if hexagonal else 0.0)
-    y = rows * step * (np.sqrt(3) / 2 if hexagonal else 1.0)
-    quality = np.ones(phase.shape)
-    columns = [*np.moveaxis(euler, -1, 0), x, y, 50 * quality, 0.9 * quality, phase]
-    return np.stack([np.asarray(column, float).ravel() for column in columns], axis=1)
-
-
-def two_halves() -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    phase = np.ones((12, 20), np.int32)
-    phase[:, 11:] = 2
-    euler = np.zeros((12, 20, 3))
-    euler[6:, :11] = (1.0, 0.5, 0.2)
-    euler[:, 11:] = (2.0, 0.9, 0.1)
-    return phase, euler
-
 
 def test_an_ang_map_gives_phases_by_name_and_grains_with_orientations(tmp_path: Path) -> None:
     phase, euler = two_halves()
@@ -195,22 +168,6 @@ def test_a_hexagonal_grid_keeps_every_row_and_every_grain(tmp_path: Path) -> Non
     assert "hexagonal" in found.notes[0]
     areas = np.bincount(read_picture(tmp_path / "a.ang").values.ravel())[1:] / found.values.size
     assert areas[0] == pytest.approx(11 / 20, abs=0.03)
-
-
-CTF = "Channel Text File\r\nPrj x\r\nXCells\t20\r\nYCells\t12\r\nPhases\t2\r\n" \
-    "4.9;4.9;5.5\t90;90;120\tQuartz-new\t7\t152\r\n3,6;3,6;3,6\t90;90;90\tCopper\t11\t225\r\n" \
-    "Phase\tX\tY\tBands\tError\tEuler1\tEuler2\tEuler3\tMAD\tBC\tBS\r\n"  # fmt: skip
-
-
-def ctf_text(phase: NDArray[Any], euler: NDArray[Any], comma: bool = False) -> str:
-    points = points_of(phase, np.degrees(euler))
-    rows = "\r\n".join(
-        "\t".join(
-            [str(int(p[7])), f"{p[3]:.4f}", f"{p[4]:.4f}", "6", "0", *(f"{a:.4f}" for a in p[:3]), "1.1", "9", "9"]
-        )
-        for p in points
-    )
-    return CTF + (rows.replace(".", ",") if comma else rows) + "\r\n"
 
 
 @pytest.mark.parametrize("comma", [False, True])

@@ -6,21 +6,17 @@ import json
 import shutil
 import struct
 import zlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tifffile
-from numpy.typing import NDArray
 from PIL import Image
 
 from imgquad_core.errors import InputError
 from imgquad_core.reading.formats import CONVERTED_BY, ReadOptions, read_picture
-
-VOLUME = (np.arange(3 * 20 * 30).reshape(3, 20, 30) // 7 % 200).astype(np.uint8)
-PLANE = VOLUME[1]
+from support.files import PLANE, VOLUME, write_dream3d, write_nifti, write_nrrd, write_oina, write_ome
 
 
 def size_text(path: Path, **options: Any) -> str | None:
@@ -29,12 +25,6 @@ def size_text(path: Path, **options: Any) -> str | None:
 
 
 # ------------------------------------------------------------------------------------------------- volumes
-
-
-def write_nrrd(path: Path, volume: NDArray[Any], **header: Any) -> Path:
-    nrrd = pytest.importorskip("nrrd")
-    nrrd.write(str(path), volume, header, index_order="C")
-    return path
 
 
 @pytest.mark.parametrize("encoding", ["raw", "gzip", "bzip2"])
@@ -86,26 +76,6 @@ def test_a_section_of_an_mrc_file_with_its_voxels(tmp_path: Path) -> None:
 
 
 # ---------------------------------------------------------------------------------------------------- Zarr
-
-
-def write_ome(path: Path, version: str, planes: NDArray[Any], axes: str, scale: float = 0.65, **more: Any) -> Path:
-    """Write a multiscale picture of two levels as OME-Zarr 0.4 or 0.5, by zarr alone."""
-    zarr = pytest.importorskip("zarr")
-    group = zarr.open_group(path, mode="w", zarr_format=2 if version == "0.4" else 3)
-    kinds = {"c": "channel", "t": "time"}
-    units = {"x": "micrometer", "y": "micrometer"}
-    named = [{"name": a, "type": kinds.get(a, "space"), **({"unit": units[a]} if a in units else {})} for a in axes]
-    levels = [planes, planes[..., ::2, ::2]]
-    datasets = []
-    for k, level in enumerate(levels):
-        chunks = (1,) * (level.ndim - 2) + (8, 16)
-        array = group.create_array(f"s{k}", shape=level.shape, dtype=level.dtype, chunks=chunks)
-        array[...] = level
-        steps = [scale * 2**k if a in "yx" else 1.0 for a in axes]
-        datasets.append({"path": f"s{k}", "coordinateTransformations": [{"type": "scale", "scale": steps}]})
-    meta = {"multiscales": [{"version": version, "axes": named, "datasets": datasets, "name": "x"}], **more}
-    group.attrs.update(meta if version == "0.4" else {"ome": {"version": version, **meta}})
-    return path
 
 
 def add_labels(path: Path, version: str, names: list[str]) -> None:
@@ -186,26 +156,6 @@ def test_chunks_of_zarr_that_unpack_to_far_more_are_refused(tmp_path: Path, code
 # ---------------------------------------------------------------------------------------------------- HDF5
 
 
-def write_oina(path: Path, rows: int = 12, cols: int = 20) -> Path:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
-        file["Format Version"] = [b"5.0"]
-        header, data = file.create_group("1/EBSD/Header"), file.create_group("1/EBSD/Data")
-        for name, value in (("X Cells", cols), ("Y Cells", rows), ("X Step", 0.2), ("Y Step", 0.2)):
-            header[name] = np.array([value])
-        for k, (name, laue) in enumerate((("Iron bcc", 11), ("Quartz", 7)), 1):
-            phase = header.create_group(f"Phases/{k}")
-            phase["Phase Name"], phase["Laue Group"] = [name.encode()], np.array([laue], np.int32)
-        phase = np.ones((rows, cols), np.uint8)
-        phase[:, 9:] = 2
-        phase[2, 3] = 0
-        euler = np.zeros((rows, cols, 3), np.float32)
-        euler[6:] = 0.7
-        data["Phase"], data["Euler"] = phase.reshape(-1, 1), euler.reshape(-1, 3)
-        data["Band Contrast"] = np.full((rows * cols, 1), 9, np.uint8)
-    return path
-
-
 def test_an_h5oina_map(tmp_path: Path) -> None:
     path = write_oina(tmp_path / "a.h5oina")
     found = read_picture(path)
@@ -217,25 +167,6 @@ def test_an_h5oina_map(tmp_path: Path) -> None:
     assert grains.values.max() == 4
     assert grains.crystals is not None
     assert np.allclose(np.radians(grains.crystals[4].euler), 0.7, atol=1e-4)
-
-
-def write_dream3d(path: Path, **options: Any) -> Path:
-    h5py = pytest.importorskip("h5py")
-    ids = np.ones((1, 20, 30, 1), np.int32)
-    ids[0, :, 10:] = 2
-    ids[0, 0, 0] = 0
-    euler = np.zeros((1, 20, 30, 3), np.float32)
-    euler[0, :, 10:] = (0.4, 0.2, 0.1)
-    with h5py.File(path, "w") as file:
-        cells = file.create_group("DataContainers/Synthetic/CellData")
-        cells.create_dataset("FeatureIds", data=ids, **options)
-        cells["EulerAngles"], cells["Phases"] = euler, np.ones_like(ids)
-        cells["Confidence Index"] = np.random.default_rng(0).random(ids.shape).astype(np.float32)
-        file["DataContainers/Synthetic/_SIMPL_GEOMETRY/SPACING"] = np.array([0.25, 0.25, 1.0], np.float32)
-        ensemble = file.create_group("DataContainers/Synthetic/CellEnsembleData")
-        ensemble["CrystalStructures"] = np.array([[999], [1]], np.uint32)
-        ensemble["PhaseName"] = [b"Unknown", b"Nickel"]
-    return path
 
 
 def test_dream3d_gives_its_grains_and_any_other_array(tmp_path: Path) -> None:
@@ -360,62 +291,6 @@ def test_an_orientation_that_is_older_than_the_pixels_is_not_followed(tmp_path: 
 
 # ------------------------------------------------------------------------------------------- hostile files
 
-Writer = Callable[[Path], Path]
-
-
-def _written_nifti(path: Path) -> Path:
-    nibabel = pytest.importorskip("nibabel")
-    nibabel.save(nibabel.Nifti1Image(VOLUME.T.copy(), np.eye(4)), path)
-    return path
-
-
-def _written_mrc(path: Path) -> Path:
-    mrcfile = pytest.importorskip("mrcfile")
-    with mrcfile.new(path, overwrite=True) as file:
-        file.set_data(VOLUME.astype(np.float32))
-    return path
-
-
-def _written_npz(path: Path) -> Path:
-    np.savez_compressed(path, a=VOLUME)
-    return path
-
-
-FILES: dict[str, Writer] = {
-    "a.nrrd": lambda path: write_nrrd(path, VOLUME, encoding="raw"),
-    "g.nrrd": lambda path: write_nrrd(path, VOLUME, encoding="gzip"),
-    "a.nii": _written_nifti,
-    "a.nii.gz": _written_nifti,
-    "a.mrc": _written_mrc,
-    "a.h5oina": write_oina,
-    "a.dream3d": write_dream3d,
-    "a.npz": _written_npz,
-}
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_cut_and_scrambled_files_are_one_line_errors_or_pictures(tmp_path: Path, name: str) -> None:
-    whole = FILES[name](tmp_path / name).read_bytes()
-    rng = np.random.default_rng(4)
-    cut = [whole[:n] for n in (1, 4, 20, 100, 200, 348, 400, len(whole) // 2, len(whole) - 40, len(whole) - 1)]
-    scrambled = []
-    for _ in range(30):
-        bytes_ = np.frombuffer(whole, np.uint8).copy()
-        at = rng.integers(0, min(len(bytes_), 1500), 6)
-        bytes_[at] = rng.integers(0, 256, 6)
-        scrambled.append(bytes_.tobytes())
-    path = tmp_path / f"x{name[1:]}"
-    for content in (*cut, *scrambled):
-        path.write_bytes(content)
-        assert is_one_line_or_picture(path)
-
-
-def is_one_line_or_picture(path: Path) -> bool:
-    try:
-        return min(read_picture(path, ReadOptions(frame=1 if "nrrd" in path.name else None)).shape) > 0
-    except InputError as error:
-        return "\n" not in str(error) and path.name in str(error)
-
 
 def test_headers_that_promise_too_much_are_refused_before_memory_is_used(tmp_path: Path) -> None:
     path = write_nrrd(tmp_path / "a.nrrd", PLANE, encoding="gzip")
@@ -425,7 +300,7 @@ def test_headers_that_promise_too_much_are_refused_before_memory_is_used(tmp_pat
     path.write_bytes(path.read_bytes().replace(b"sizes: 900000 900000", b"sizes: 9000 9000"))
     with pytest.raises(InputError, match=r"cut off"):
         read_picture(path)
-    header = bytearray(_written_nifti(tmp_path / "a.nii").read_bytes())
+    header = bytearray(write_nifti(tmp_path / "a.nii").read_bytes())
     header[42:46] = struct.pack("<hh", 32000, 32000)
     (tmp_path / "a.nii").write_bytes(header)
     with pytest.raises(InputError, match="more than max_pixels"):

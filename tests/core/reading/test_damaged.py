@@ -1,0 +1,44 @@
+"""A damaged file of any format is read, or refused in one line that names it; memory is not taken on its word."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from support.files import WRITERS, assert_read_or_refused, damage
+
+CUTS = (1, 4, 20, 100, 200, 348, 400, -40, -1)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A whole file of each format."""
+    return {name: writer(tmp_path_factory.mktemp("whole") / name) for name, writer in WRITERS.items()}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_whole_file_is_read(written: dict[str, Path], name: str) -> None:
+    assert assert_read_or_refused(written[name])
+
+
+@pytest.mark.parametrize("name", [name for name in WRITERS if not name.endswith(".zarr")])
+def test_a_file_that_is_cut_off(written: dict[str, Path], tmp_path: Path, name: str) -> None:
+    whole = written[name].read_bytes()
+    for end in (*CUTS, len(whole) // 2):
+        (tmp_path / name).write_bytes(whole[:end])
+        assert_read_or_refused(tmp_path / name)
+
+
+@given(name=st.sampled_from(sorted(WRITERS)), seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_file_of_changed_bytes(written: dict[str, Path], tmp_path: Path, name: str, seed: int) -> None:
+    target = tmp_path / name
+    shutil.rmtree(target, ignore_errors=True)
+    (shutil.copytree if written[name].is_dir() else shutil.copyfile)(written[name], target)
+    damage(target, np.random.default_rng(seed))
+    assert_read_or_refused(target)
