@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from io import StringIO
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +50,7 @@ def read_ang(path: Path, options: ReadOptions) -> Picture:
         lost = (table[:, 6] < 0) | (table[:, :3] > _NOT_INDEXED).all(axis=1)
         points = Points(table[:, 3], table[:, 4], np.where(lost, -1, phase).astype(np.int32), table[:, :3])
         found = on_pixels(path, points, phases, "um", options)
-    return crystal_picture(path, found, options)
+    return _told_of_loss(crystal_picture(path, found, options), _promised_by_ang(header), len(table))
 
 
 def read_ctf(path: Path, options: ReadOptions) -> Picture:
@@ -67,7 +69,31 @@ def read_ctf(path: Path, options: ReadOptions) -> Picture:
         indexed = np.where(phase > 0, phase, -1).astype(np.int32)
         points = Points(table[:, 1], table[:, 2], indexed, np.radians(table[:, 3:]))
         found = on_pixels(path, points, phases, "um", options)
-    return crystal_picture(path, found, options)
+    return _told_of_loss(crystal_picture(path, found, options), _promised_by_ctf(head), len(table))
+
+
+def _told_of_loss(picture: Picture, promised: int, n_points: int) -> Picture:
+    """Add a note where a header promises more points than its table has; headers are stale at times, so no error."""
+    if n_points >= promised:
+        return picture
+    note = f"its header promises {promised} points, its table has {n_points}: the file may be cut off"
+    return replace(picture, notes=(*picture.notes, note))
+
+
+def _product_of(lines: Sequence[str], names: tuple[str, str]) -> int:
+    """Return the product of two whole numbers of a header, by the names before them; 0 where one is missing."""
+    found = [re.search(rf"^[# ]*{name}:?\s+(\d+)\s*$", "\n".join(lines), re.MULTILINE) for name in names]
+    return prod(int(number.group(1)) if number else 0 for number in found)
+
+
+def _promised_by_ang(header: Sequence[str]) -> int:
+    """Rows times columns; of hexagonal grids, whose rows differ by one, one row of two is a point shorter."""
+    odd, even = (_product_of(header, ("NROWS", f"NCOLS_{which}")) for which in ("ODD", "EVEN"))
+    return min(odd, even)
+
+
+def _promised_by_ctf(head: Sequence[str]) -> int:
+    return _product_of(head, ("XCells", "YCells"))
 
 
 def _text(path: Path) -> str:

@@ -107,8 +107,10 @@ def write_dream3d(path: Path, **options: Any) -> Path:
 
 
 def ang_text(points: NDArray[np.float64], header: str = PHASES) -> str:
+    n_rows, n_cols = (len(np.unique(points[:, axis].round(6))) for axis in (4, 3))
+    grid = f"# NCOLS_ODD: {n_cols}\n# NCOLS_EVEN: {n_cols}\n# NROWS: {n_rows}\n"
     rows = "\n".join(" ".join(f"{value:.5f}" for value in row[:7]) + f" {int(row[7])} 0 1.2" for row in points)
-    return f"# TEM_PIXperUM 1.0\n{header}# GRID: SqrGrid\n#\n{rows}\n"
+    return f"# TEM_PIXperUM 1.0\n{header}# GRID: SqrGrid\n{grid}#\n{rows}\n"
 
 
 def points_of(
@@ -224,13 +226,17 @@ def damage(path: Path, rng: np.random.Generator) -> None:
     file.write_bytes(data[: int(rng.integers(1, len(data) + 1))] if rng.random() < 0.3 else data)
 
 
+def options_for(path: Path) -> ReadOptions:
+    """Return how the one picture of a file, or the middle one of a stack, is read."""
+    return ReadOptions(max_pixels=10_000, frame=1 if path.name.endswith(STACKS) else None)
+
+
 def assert_read_or_refused(path: Path) -> bool:
     """Return whether a file is a picture; where it is none, the error is one line that names it."""
     from imgquad_mesh.datasets.pictures import read_any
 
-    options = ReadOptions(max_pixels=10_000, frame=1 if path.name.endswith(STACKS) else None)
     try:
-        return min(read_any(path, options).shape) > 0
+        return min(read_any(path, options_for(path)).shape) > 0
     except InputError as error:
         told = str(error)
     assert "\n" not in told, told

@@ -21,6 +21,7 @@ from imgquad_core.reading.picture import Picture, picture_of
 
 from .fields import materials_of
 from .images import MATERIAL, pixel_counts
+from .metaimage import assert_whole
 
 #: extensions of what is read here
 EXTENSIONS = (".vti", ".mha", ".mhd")
@@ -72,6 +73,8 @@ def read_vtk(path: Path, options: ReadOptions) -> Picture:
 def _image(path: Path, options: ReadOptions) -> pv.ImageData:
     """Read a file whose header promises no more than is allowed."""
     is_vti = path.suffix.lower() == ".vti"
+    if not is_vti:
+        assert_whole(path)
     try:
         with silent_vtk():
             reader = pv.XMLImageDataReader(str(path)) if is_vti else pv.get_reader(str(path))  # type: ignore[no-untyped-call]
