@@ -178,6 +178,60 @@ def caches(rng: Generator, folder: Path) -> None:
         assert (done.returncode, done.stderr) == (0, ""), done.stderr[-500:]
 
 
+TIGHT = """
+import sys
+from pathlib import Path
+import numpy as np
+from imgquad_core import mesh_image
+from imgquad_core.errors import InputError
+from imgquad_mesh.outputs.files import write_mesh_file
+labels = np.zeros((80, 120), np.int32); labels[20:60, 40:80] = 1
+path = Path(sys.argv[1])
+path.write_bytes(b"old")
+try:
+    write_mesh_file(mesh_image(labels), path)
+    assert False, "it should not fit"
+except InputError as error:
+    assert path.read_bytes() == b"old" and "cannot write" in str(error), error
+assert not list(path.parent.glob(".imgquad-*")), "leftovers"
+"""
+
+
+def mounted(folder: Path, mounts: str, *arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run Python in a mount namespace of its own (Linux, util-linux), after commands of a shell that mount."""
+    command = ["unshare", "--map-root-user", "--mount", "sh", "-ec", mounts + '; exec "$@"', "sh", sys.executable]
+    env = os.environ | {"PYTHONPATH": path(), "PYTHONDONTWRITEBYTECODE": "1"} | environment
+    return subprocess.run(
+        [*command, *map(str, arguments)], cwd=folder, env=env, capture_output=True, text=True, check=False
+    )
+
+
+def mounts(rng: Generator, folder: Path) -> None:
+    """Packages, home and temporary files mounted read-only, or a full disk: a run goes on, or is refused."""
+    for name in ("packages", "home", "temporary", "disk"):
+        (folder / name).mkdir()
+    kernels = "from imgquad_core.jit import kernel\n@kernel\ndef double(x):\n    return 2.0 * x\n"
+    (folder / "packages" / "cached_kernel.py").write_text(kernels)
+    own = {"HOME": str(folder / "home"), "TMPDIR": str(folder / "temporary"), "NUMBA_CACHE_DIR": ""}
+    read_only = "for f in packages home{}; do mount --bind $f $f; mount -o remount,bind,ro $f; done"
+    small = "mount -t tmpfs -o size={}k tmpfs disk"
+    kind = str(rng.choice(["temporary left", "nothing left", "full cache", "full disk"]))
+    if kind == "full disk":
+        target = f"disk/m{rng.choice(MESH_FORMATS)}"
+        done = mounted(folder, small.format(4 * int(rng.integers(1, 3))), "-c", TIGHT, target)
+        assert done.returncode == 0, (target, done.stderr[-500:])
+        return
+    if kind == "full cache":
+        own["NUMBA_CACHE_DIR"] = str(folder / "disk")
+        done = mounted(folder, small.format(4), "-c", CACHED, "packages", **own)
+    else:
+        shut = f" temporary {folder} /tmp /var/tmp" if kind == "nothing left" else ""  # where Python looks, in turn
+        done = mounted(folder, read_only.format(shut), "-c", CACHED, "packages", **own)
+    assert done.returncode == 0, (kind, done.stderr[-500:])
+    assert len(done.stderr.strip().splitlines()) == 1, (kind, done.stderr)
+    assert ("are kept in" if kind == "temporary left" else "are not kept") in done.stderr, (kind, done.stderr)
+
+
 def meshes(rng: Generator, folder: Path) -> None:
     """A mesh of any label picture: valid by the judge of the tests, twice the same bytes, valid turned, too."""
     from imgquad_core import MeshOptions, run
@@ -303,6 +357,7 @@ SECTIONS = {
         (kills, 250),
         (full_disks, 250),
         (caches, 60),
+        (mounts, 40),
         (meshes, 4000),  # two pictures each: as it is and turned
         (elements, 1500),
         (threads, 10),

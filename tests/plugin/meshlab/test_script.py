@@ -221,6 +221,19 @@ def test_last_good_mesh_survives_a_filter_that_fails(case: str, tmp_path: Path) 
     assert (tmp_path / "out.last_good.ply").read_bytes() == (tmp_path / "expected.ply").read_bytes()
 
 
+@needs_meshlab
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+def test_a_filter_that_takes_all_memory_is_stopped_at_its_limit(tmp_path: Path) -> None:
+    finest = '<Param type="RichInt" name="Iterations" value="12"/>'
+    finest += '<Param type="RichAbsPerc" name="Threshold" value="0.0001" min="0" max="100"/>'
+    triangles = '<filter name="Turn into a Pure-Triangular mesh"/>'
+    halves = f'<filter name="Subdivision Surfaces: Midpoint">{finest}</filter>'  # faces fourfold, twelve times
+    path = script_file(tmp_path, MESH, triangles, halves)
+    with pytest.raises(ScriptError, match=r"Midpoint': needed more than 2 GB .* the mesh before it is in"):
+        run_script(path, image=LABELS, output=tmp_path / "out.obj", memory=2.0)
+    assert (tmp_path / "out.last_good.ply").stat().st_size > 0
+
+
 def test_wrong_deadline_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="deadline is 0"):
         run_script(script_file(tmp_path, MESH), image=LABELS, deadline=0.0)
