@@ -134,7 +134,26 @@ def read_mrc(path: Path, options: ReadOptions) -> Picture:
         outer = tuple(("volume" if k < data.ndim - 3 else "section", n) for k, n in enumerate(data.shape[:-2]))
         place = Stack(str(path), outer).choose(options) if outer else {}
         plane = data[tuple(place[axis] for axis, _ in outer)]
+        if data.dtype == np.int8 and not _has_signed_bytes(file.header):
+            plane = plane.view(np.uint8)
         voxel = file.voxel_size
         size = size_of(float(voxel.x), float(voxel.y), "angstrom", "MRC voxel size")
         told = ", ".join(f"{axis} {place[axis]} of {n}" for axis, n in outer if n > 1)
         return _slice_picture(path, plane, size, told)
+
+
+_IMOD = 1146047817  #: stamp of IMOD in a header
+
+
+def _has_signed_bytes(header: Any) -> bool:
+    """Tell how bytes are meant: signed (MRC2014), or unsigned as IMOD says by a flag, others by their largest value.
+
+    References
+    ----------
+    The MRC file format used by IMOD, https://bio3d.colorado.edu/imod/doc/mrc_format.txt (bytes 152 and 156).
+    """
+    words = np.frombuffer(bytes(header.extra2), header.dtype["nx"])  # from byte 112 on, in the order of the file
+    stamp, flags = words[10:12].tolist()
+    if stamp == _IMOD:
+        return bool(flags & 1)
+    return not float(header.dmax) > np.iinfo(np.int8).max

@@ -75,6 +75,28 @@ def test_a_section_of_an_mrc_file_with_its_voxels(tmp_path: Path) -> None:
     assert size_text(tmp_path / "a.mrc", frame=1) == "1.7 angstrom"
 
 
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize(("stamp", "flags", "largest", "signed"), [
+    (1146047817, 12, 0.0, False), (1146047817, 13, 0.0, True), (0, 0, 199.0, False), (0, 0, 100.0, True),
+])  # fmt: skip
+def test_bytes_of_an_mrc_file_are_unsigned_where_it_says_so(
+    tmp_path: Path, order: str, stamp: int, flags: int, largest: float, signed: bool
+) -> None:
+    mrcfile = pytest.importorskip("mrcfile")
+    path = tmp_path / "a.mrc"
+    with mrcfile.new(path) as file:
+        file.set_data(PLANE.view(np.int8))
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<f", content, 80, largest)
+    struct.pack_into("<ii", content, 152, stamp, flags)
+    if order == ">":  # every number of the header but texts, and the stamp of the machine
+        words = np.frombuffer(content, "<u4", 56).astype(">u4").tobytes()
+        content[: len(words)] = words
+        content[104:108], content[208:216] = b"\0" * 4, b"MAP \x11\x11\0\0"
+    path.write_bytes(content)
+    assert (read_picture(path).values == (PLANE.view(np.int8) if signed else PLANE)).all()
+
+
 # ---------------------------------------------------------------------------------------------------- Zarr
 
 
