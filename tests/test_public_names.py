@@ -21,7 +21,7 @@ labels = np.zeros((20, 30), np.int32); labels[5:15, 8:20] = 1
 for _ in range(2):
     try:
         imgquad_mesh.crosscheck(mesh_image(labels))
-    except imgquad_mesh.meshlab.catalogue.MissingMeshLab:
+    except imgquad_mesh.meshlab.pymeshlab_filters.MissingMeshLab:
         pass
     assert callable(imgquad_mesh.crosscheck)
 """

@@ -1,5 +1,6 @@
-from .elements import ElementOptions, make_elements
+from .elements import make_elements
 from .femesh import FEMesh
+from .options import ElementOptions
 from .sets import fe_mesh, without_interfaces
 from .triangles import split_quads
 

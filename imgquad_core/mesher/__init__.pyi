@@ -1,5 +1,6 @@
-from .efforts import EFFORTS, MeshingOptions
+from .efforts import EFFORTS
 from .meshing import mesh_boundaries
+from .options import MeshingOptions
 from .triangulators import triangulator_used
 
 __all__ = [

@@ -24,10 +24,11 @@ from imgquad_core.cleanup.sliding import slide
 from imgquad_core.cleanup.strips import independent_nodes, strips_of
 from imgquad_core.model import BoundaryGraph, Materials, PointKind, QuadMesh
 
-from .efforts import EFFORTS, MeshingOptions
-from .levels import LEAST_WIDTH, consistent, mesh_faces
+from .efforts import EFFORTS
+from .options import MeshingOptions
 from .outline import with_short_chains_halved
 from .refits import State, with_musts, with_wishes
+from .strides import LEAST_WIDTH, consistent, mesh_faces
 
 FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60 degrees give .866
 

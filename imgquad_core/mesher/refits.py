@@ -14,8 +14,9 @@ from imgquad_core.errors import TopologyError
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.model import BoundaryGraph
 
-from .efforts import MeshingOptions, Tuning
-from .levels import Meshed, consistent, faces_beside, faces_of, mesh_faces
+from .efforts import Tuning
+from .options import MeshingOptions
+from .strides import Meshed, consistent, faces_beside, faces_of, mesh_faces
 
 PATIENCE = 6  # rounds that reach no farther than the edges beside the quads
 

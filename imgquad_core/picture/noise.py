@@ -203,7 +203,7 @@ def _remove_once(colors: Labels, n_colors: int, options: DenoiseOptions) -> int:
             n = merged_roots(clusters, queue, size, merged)
             roots = np.unique(np.concatenate([roots, merged[:n]]))
         if len(roots):
-            gone += absorb_noise(colors, clusters, queue, scratch, roots, size, options.min_length, rule)
+            gone += recolour_noise(colors, clusters, queue, scratch, roots, size, options.min_length, rule)
     return gone
 
 
@@ -216,7 +216,7 @@ def _queued(colors: Labels, clusters: Clusters, min_pixels: int) -> Queue:
 
 
 @kernel
-def absorb_noise(
+def recolour_noise(
     colors: Labels,
     clusters: Clusters,
     queue: Queue,

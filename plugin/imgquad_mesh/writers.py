@@ -36,7 +36,7 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
     --------
     >>> grid.save("part.inp", analysis="plane strain", order=2)  # doctest: +SKIP
     """
-    from imgquad_core.fe.elements import ElementOptions, make_elements
+    from imgquad_core.fe import ElementOptions, make_elements
     from imgquad_core.writers import write_mesh
 
     known = ("order", "nodes", "cohesive", "extrude", "layers", "periodic", "split_quads")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
-from imgquad_core.mesher.efforts import EFFORTS, MeshingOptions
+from imgquad_core.mesher import EFFORTS, MeshingOptions
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import VOID, LabelImage, QuadMesh
 from imgquad_core.options import MeshOptions

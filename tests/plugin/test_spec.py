@@ -17,7 +17,7 @@ import pytest
 
 from imgquad_core.declared import declarations
 from imgquad_core.errors import InputError
-from imgquad_mesh.meshlab.steps import STEPS
+from imgquad_mesh.meshlab.own_filters import STEPS
 from imgquad_mesh.spec import Filter, filters, filters_file, find_filter, python_name, read_filters
 from imgquad_mesh.texts import TEXTS, help_in_scripts, options_from, values_of
 from support import ROOT

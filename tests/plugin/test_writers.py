@@ -11,7 +11,7 @@ import pytest
 import pyvista as pv
 
 from imgquad_core.errors import InputError
-from imgquad_core.fe.elements import ElementOptions, make_elements
+from imgquad_core.fe import ElementOptions, make_elements
 from imgquad_core.fe.sets import fe_mesh
 from imgquad_core.writers import write_mesh
 from imgquad_mesh.datasets.grids import from_grid, to_fe_grid, to_grid

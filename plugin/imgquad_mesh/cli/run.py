@@ -17,7 +17,7 @@ from .mesh_options import add_mesh_options, mesh_options
 from .script import print_crosscheck
 
 if TYPE_CHECKING:
-    from imgquad_core.fe.elements import ElementOptions
+    from imgquad_core.fe import ElementOptions
     from imgquad_core.options import MeshOptions
     from imgquad_core.pipeline import Run
 
@@ -115,7 +115,7 @@ def mesh_to_files(
         written.
     """
     from imgquad_core.measures.quality import MIN_QUALITY, require_quality
-    from imgquad_mesh.meshlab.catalogue import meshlab_filters
+    from imgquad_mesh.meshlab.pymeshlab_filters import meshlab_filters
     from imgquad_mesh.outputs import files
     from imgquad_mesh.outputs.report import build_report, element_notes
     from imgquad_mesh.progress import progress_bar_if

@@ -1,4 +1,5 @@
 """Filter scripts in MeshLab's form that mix our filters with MeshLab's, which run in a process of their own.
 
-Our filters: filters.xml describes them, `steps` does them. MeshLab's own: `catalogue` lists them, `process` runs them.
+Our filters: filters.xml describes them, `own_filters` does them. MeshLab's own: `pymeshlab_filters` lists them,
+`process` runs them.
 """

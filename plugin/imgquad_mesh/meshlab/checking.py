@@ -12,10 +12,10 @@ from imgquad_core.errors import InputError, ScriptError
 from imgquad_mesh.spec import Filter, Parameter, filters, find_filter, python_name
 from imgquad_mesh.texts import options_from
 
-from .catalogue import PRINTED_TYPES, MissingMeshLab, meshlab_filters, meshlab_parameters
 from .mlx import Script, ScriptFilter, ScriptParameter, ScriptValue, script_text
 from .names import all_meshlab_names, meshlab_function, nearest
-from .steps import STEPS, check_output, script_path
+from .own_filters import STEPS, check_output, script_path
+from .pymeshlab_filters import PRINTED_TYPES, MissingMeshLab, meshlab_filters, meshlab_parameters
 
 #: types in scripts that stand for the same kind of value
 _NUMBER_OR_TEXT = ("pixel_size",)  # a number, or two of them in a text

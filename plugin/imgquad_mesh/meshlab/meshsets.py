@@ -12,8 +12,8 @@ from imgquad_core.model import Materials, QuadMesh
 from imgquad_core.tracing import trace_mesh
 from imgquad_core.whole_files import scratch_folder
 
-from .catalogue import MissingMeshLab
 from .layer import Layer, layer_of, surface
+from .pymeshlab_filters import MissingMeshLab
 
 
 def quad_layer(mesh: QuadMesh, label: str = "quad mesh") -> Layer:

@@ -15,8 +15,8 @@ from imgquad_mesh.texts import options_from
 
 from .layer import Layer, layer_of
 from .meshsets import add_to, new_meshset
+from .own_filters import STEPS
 from .state import State
-from .steps import STEPS
 
 
 class MeshSetLayers:

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from imgquad_core.declared import Declaration
 from imgquad_core.errors import ImgquadError
 
-from .catalogue import meshlab_filters
 from .layer import Layer, load_layer, save_layer
+from .pymeshlab_filters import meshlab_filters
 from .worker import MEMORY
 
 #: filters that leave points and faces as they are: nothing to save before the next one

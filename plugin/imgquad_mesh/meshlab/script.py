@@ -21,10 +21,10 @@ from .checking import MeshLabStep, OwnStep, checked_steps, files_of_steps
 from .layer import Layer, layer_of, write_ply
 from .meshsets import add_to
 from .mlx import read_script
+from .own_filters import STEPS
 from .process import DEADLINE, MeshLabError, MeshLabProcess, memory_limit
 from .saving import check_saving, read_grid, save_current
 from .state import LayerList, State
-from .steps import STEPS
 
 Progress: TypeAlias = Callable[[str, int, int], None]
 

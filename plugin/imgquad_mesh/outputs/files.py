@@ -18,7 +18,7 @@ from imgquad_core.writers.hdf5_times import erase_times
 from imgquad_core.writers.neighbours import check_neighbours, files_of
 
 if TYPE_CHECKING:
-    from imgquad_core.fe.elements import ElementOptions
+    from imgquad_core.fe import ElementOptions
     from imgquad_core.fe.femesh import FEMesh
     from imgquad_core.model import LabelImage, QuadMesh
     from imgquad_core.pipeline import Run

@@ -15,8 +15,9 @@ from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.cleanup.strips import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
 from imgquad_core.measures.quality import quality_report
-from imgquad_core.mesher.efforts import MeshingOptions, Tuning
+from imgquad_core.mesher.efforts import Tuning
 from imgquad_core.mesher.meshing import mesh_boundaries
+from imgquad_core.mesher.options import MeshingOptions
 from imgquad_core.model import LabelImage
 from support import naive
 from support.faces import assert_valid_faces, grid, polygon_graph, quads_of, valences

@@ -14,9 +14,10 @@ from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.measures.quality import quality_report
-from imgquad_core.mesher import levels, meshing, refits
-from imgquad_core.mesher.efforts import EFFORTS, MeshingOptions, Tuning
+from imgquad_core.mesher import meshing, refits, strides
+from imgquad_core.mesher.efforts import EFFORTS, Tuning
 from imgquad_core.mesher.meshing import mesh_boundaries
+from imgquad_core.mesher.options import MeshingOptions
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind, QuadMesh
 from support import naive
 from support.faces import Points, graph_of, polygon_graph, voronoi_graph
@@ -122,11 +123,11 @@ def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypa
     y, x = np.mgrid[:60, :70]
     image = label_image(((x + 4 * np.sin(y / 5)) // 10).astype(np.int32))  # wavy stripes
     graph = boundaries(image, 4.0)
-    mesh_faces = levels.mesh_faces
+    mesh_faces = strides.mesh_faces
     first, last = int(graph.region_label.argmin()), int(graph.region_label.argmax())
     rounds: list[set[int]] = []
 
-    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions) -> levels.Meshed:
+    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions) -> strides.Meshed:
         done = mesh_faces(graph, todo, options)
         worst = np.full(len(todo), 0.95)
         worst[first], worst[last] = (0.95, 0.2) if rounds else (0.3, 0.3)
@@ -169,9 +170,9 @@ def test_every_face_has_quads_however_bad_they_are(monkeypatch: pytest.MonkeyPat
 
     graph = voronoi_graph(64, 3, 2.0, 0)
     everything = np.ones(len(graph.region_label), bool)
-    monkeypatch.setattr(levels, "lower_to_worst", worst_there_is)
+    monkeypatch.setattr(strides, "lower_to_worst", worst_there_is)
     for effort in EFFORTS:
-        done = levels.mesh_faces(graph, everything, MeshingOptions(size=2.0, effort=effort))
+        done = strides.mesh_faces(graph, everything, MeshingOptions(size=2.0, effort=effort))
         faces = np.concatenate([np.unique(part.face) for part in done.parts])
         assert sorted(faces.tolist()) == list(range(len(everything)))
 

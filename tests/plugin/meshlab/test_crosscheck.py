@@ -15,8 +15,8 @@ from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import mesh_image
 from imgquad_core.tracing import trace_mesh
 from imgquad_mesh.meshlab import crosscheck as module
-from imgquad_mesh.meshlab.catalogue import MissingMeshLab, meshlab_filters
 from imgquad_mesh.meshlab.crosscheck import Comparison, crosscheck, touching_points
+from imgquad_mesh.meshlab.pymeshlab_filters import MissingMeshLab, meshlab_filters
 from support import ROOT
 
 IMAGES = ROOT.parent / "shared" / "images"

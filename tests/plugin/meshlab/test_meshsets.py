@@ -15,10 +15,10 @@ from imgquad_core.errors import InputError
 from imgquad_core.model import Materials
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import mesh_image
-from imgquad_mesh.meshlab.catalogue import MissingMeshLab, meshlab_filters
 from imgquad_mesh.meshlab.layer import Layer, face_of_triangle, load_layer, polyline, save_layer, surface, write_ply
 from imgquad_mesh.meshlab.meshsets import face_materials, quad_layer, quad_mesh
 from imgquad_mesh.meshlab.process import MeshLabError, MeshLabProcess
+from imgquad_mesh.meshlab.pymeshlab_filters import MissingMeshLab, meshlab_filters
 from imgquad_mesh.outputs.files import write_mesh_file
 from imgquad_mesh.spec import filters
 from support import ROOT

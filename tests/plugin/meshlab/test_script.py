@@ -16,12 +16,12 @@ import pytest
 from imgquad_core.errors import InputError, ScriptError
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import mesh_image
-from imgquad_mesh.meshlab import catalogue
-from imgquad_mesh.meshlab.catalogue import MissingMeshLab, meshlab_filters, meshlab_parameters
+from imgquad_mesh.meshlab import pymeshlab_filters
 from imgquad_mesh.meshlab.checking import MeshLabStep, checked_steps
 from imgquad_mesh.meshlab.layer import Layer, write_ply
 from imgquad_mesh.meshlab.mlx import Script, read_script, script_text
 from imgquad_mesh.meshlab.names import meshlab_function
+from imgquad_mesh.meshlab.pymeshlab_filters import MissingMeshLab, meshlab_filters, meshlab_parameters
 from imgquad_mesh.meshlab.script import run_script
 from imgquad_mesh.meshlab.templates import filter_script, named_filters, run_as_script
 from imgquad_mesh.spec import filters, python_name
@@ -249,10 +249,10 @@ def test_missing_picture_is_named(tmp_path: Path) -> None:
 
 @pytest.fixture
 def asked_anew() -> Any:
-    for function in (catalogue.meshlab_filters, catalogue.meshlab_parameters):
+    for function in (pymeshlab_filters.meshlab_filters, pymeshlab_filters.meshlab_parameters):
         function.cache_clear()
     yield
-    for function in (catalogue.meshlab_filters, catalogue.meshlab_parameters):
+    for function in (pymeshlab_filters.meshlab_filters, pymeshlab_filters.meshlab_parameters):
         function.cache_clear()
 
 
@@ -271,7 +271,7 @@ def test_half_loaded_pymeshlab_names_the_packages(
     package.mkdir(parents=True)
     (package / "__init__.py").write_text(module)
     monkeypatch.setenv("PYTHONPATH", str(package.parent))
-    monkeypatch.setattr(catalogue, "pymeshlab_folder", lambda: package)
+    monkeypatch.setattr(pymeshlab_filters, "pymeshlab_folder", lambda: package)
     with pytest.raises(ScriptError, match=message):
         run_script(script_file(tmp_path, MESH, filter_xml("Laplacian Smooth")), image=LABELS)
 

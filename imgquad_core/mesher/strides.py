@@ -22,9 +22,10 @@ from imgquad_core.model import BoundaryGraph
 from .composing import compose
 from .crossfield import cross_field
 from .cutting import CutMesh, FaceConflict, cut_at_constraints
-from .efforts import EFFORTS, MeshingOptions
+from .efforts import EFFORTS
 from .finishing import finished
 from .frontal import frontal_points
+from .options import MeshingOptions
 from .outline import Outline, chains_in_conflict, chains_of, coarse_segments, mean_edges, outline, wide_faces
 from .splitting import split_composed
 from .triangulation import Triangles, constraint_table, triangulate
@@ -87,7 +88,7 @@ def mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> Me
     wide = todo & wide_faces(graph, 4, LEAST_WIDTH) & (rim >= EVEN[4]) & (best.worst < ENOUGH)
     best = _better(best, _mesh_wide(graph, wide, 4, effort.wide, options))
     enough = np.where(_large_faces(best), min(options.tuning.worst, effort.again_below), effort.again_below)
-    return _better(best, _mesh_level(graph, todo & (best.worst < enough), 2, effort.narrow, options))
+    return _better(best, _mesh_at_stride(graph, todo & (best.worst < enough), 2, effort.narrow, options))
 
 
 def _better(one: Meshed, other: Meshed) -> Meshed:
@@ -107,13 +108,13 @@ def _mesh_wide(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, op
     """Mesh faces coarsely, without those whose chords contradict each other."""
     while True:
         try:
-            return _mesh_level(graph, faces, stride, how, options)
+            return _mesh_at_stride(graph, faces, stride, how, options)
         except _Conflict as conflict:
             faces = faces.copy()
             faces[conflict.regions] = False
 
 
-def _mesh_level(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> Meshed:
+def _mesh_at_stride(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> Meshed:
     """Mesh the flagged faces from segments of `stride` edges."""
     worst = np.ones(len(faces))
     if not faces.any():
