@@ -42,6 +42,7 @@ class Joined(NamedTuple):
     """What was joined."""
 
     chains: PixelChains
+    which: Ints  #: (n_chains,) old number of each
     n_joins: int
 
 
@@ -95,12 +96,13 @@ def join_short_chains(chains: PixelChains, shortest: float, farthest: float, uni
     Returns
     -------
     Joined
-        The chains that are left, in their order, and the number of joins.
+        The chains that are left, in their order, their old numbers, and the number of joins.
     """
     curves, ends = curves_of(*chains)
+    nothing = Joined(chains, np.arange(len(curves.ends)), 0)
     candidates = _short(curves.raw, curves.offsets, curves.ends, shortest)
     if shortest <= 0.0 or not len(candidates):
-        return Joined(chains, 0)
+        return nothing
     forbidden = np.zeros(len(curves.ends), bool)
     ring, first = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
     rank = _ranks(ends.place, ends.kind, chains.graph.shape)
@@ -129,11 +131,11 @@ def join_short_chains(chains: PixelChains, shortest: float, farthest: float, uni
         )
         into = _join_all(net, grid, chain, candidates, forbidden, shortest, farthest, _ALONG, _REACHES)
         if not net.gone.any():
-            return Joined(chains, 0)
+            return nothing
         joined, which = _drawn(chains, net, units)
         bad = _nodes_in_conflict(joined, net, which, units)
         if not bad.any():
-            return Joined(joined, int(net.gone.sum()))
+            return Joined(joined, which, int(net.gone.sum()))
         forbidden |= net.gone & (bad[into] | (attempt >= _ATTEMPTS - 2))
     raise AssertionError("no join, no conflict")
 

@@ -27,6 +27,7 @@ from .junctions import place_junctions
 from .nodes import Nodes
 from .oblong_pixels import stretch
 from .options import SmoothingOptions
+from .pores import pores_of
 from .sharp_corners import beside_corners, find_corners, place_corners
 from .stairs import Step, as_step, find_step, in_data_points
 from .withdrawal import Draft, place_freely, restore_areas_freely
@@ -62,7 +63,8 @@ def smooth_boundaries(
     options = options or SmoothingOptions()
     step = find_step(graph) if options.step == "auto" else as_step(options.step)
     true = _TrueShape.of(graph.shape, shape, step)
-    chains = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step)
+    pores = pores_of(graph)
+    chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step)
     width = 0.5 * options.tolerance / true.unit
     if width > 1.0:
         chains = averaged(chains, width, UNITS * np.array(step))
@@ -80,11 +82,11 @@ def smooth_boundaries(
     )
     size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent)
     nodes, gently = place_freely(draft, size)
-    areas = graph.region_pixels * true.pixel
-    sides = np.array(chains.graph.chain_regions)
+    areas = np.append(graph.region_pixels, pores.pixels) * true.pixel
+    sides = pores.sides[which]
     nodes = restore_areas_freely(sides, areas / true.unit**2, draft, nodes, room, options.max_shift, gently)
     nodes = nodes._replace(points=snapped(nodes.points * true.unit))
-    pixels = np.maximum(np.rint(areas), 1).astype(np.int64)
+    pixels = np.maximum(np.rint(graph.region_pixels * true.pixel), 1).astype(np.int64)
     return _graph(replace(chains.graph, shape=true.shape, region_pixels=pixels), draft, nodes)
 
 
@@ -110,12 +112,13 @@ class _TrueShape(NamedTuple):
         return _TrueShape((rows, cols), unit, (rows / unit, cols / unit), pixel)
 
 
-def _joined(chains: PixelChains, options: SmoothingOptions, unit: float, step: Step) -> PixelChains:
-    """Join short chains, in data points."""
+def _joined(chains: PixelChains, options: SmoothingOptions, unit: float, step: Step) -> tuple[PixelChains, Ints]:
+    """Join short chains, in data points; also return the old number of each chain."""
     usual = max(2.0 * options.max_shift, options.tolerance / unit)
     shortest = usual if options.join is None else options.join / unit
     farthest = max(0.5 * shortest, options.max_shift)
-    return join_short_chains(chains, shortest, farthest, UNITS * np.array(step)).chains
+    joined = join_short_chains(chains, shortest, farthest, UNITS * np.array(step))
+    return joined.chains, joined.which
 
 
 def _asked_sizes(graph: BoundaryGraph, is_frame: Flags, options: SmoothingOptions) -> Floats:
