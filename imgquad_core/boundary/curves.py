@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.jit import kernel, verb
-from imgquad_core.model import BoundaryGraph, PointKind
+from imgquad_core.model import VOID, BoundaryGraph, PointKind
 
 _LONGEST_RUN = 16  # sides from step to step that count
 #: what a dense point is: corner of a pixel, middle of a horizontal or vertical side, or none of these
@@ -76,7 +76,7 @@ def curves_of(graph: BoundaryGraph, side: Ints | None = None) -> tuple[Curves, E
         sample_weights(side, np.array(graph.chain_offsets)),
         np.array(graph.chain_offsets),
         ends,
-        graph.point_kind[second] == PointKind.FRAME,
+        (graph.point_kind[second] == PointKind.FRAME) | _along_border(graph, first, second, last),
     )
     return curves, Ends(
         graph.points[nodes],
@@ -84,6 +84,13 @@ def curves_of(graph: BoundaryGraph, side: Ints | None = None) -> tuple[Curves, E
         np.concatenate([[0], np.cumsum(np.bincount(at, minlength=len(nodes)))]).astype(np.int64),
         sockets[np.argsort(at, kind="stable")],
     )
+
+
+def _along_border(graph: BoundaryGraph, first: Ints, second: Ints, last: Ints) -> Flags:
+    """Tell which chains are one straight side of the picture's border, without a point between their ends."""
+    p, q = graph.points[first], graph.points[last]
+    is_along = ((p == q) & ((p == 0.0) | (p == np.array(graph.shape[::-1])))).any(axis=1)
+    return np.asarray(is_along & (second == last) & (graph.chain_regions == VOID).any(axis=1))
 
 
 def numbered(offsets: Ints, node: Ints, n_nodes: int) -> Ints:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from imgquad_core import MeshOptions, mesh_image
 from imgquad_core.boundary.curves import pixel_chains
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.joins import join_short_chains
@@ -87,3 +88,10 @@ def test_no_join_where_none_is_asked_for() -> None:
     assert smooth_boundaries(graph, SmoothingOptions(4.0, join=0.0)).n_chains == graph.n_chains
     assert smooth_boundaries(graph, SmoothingOptions(4.0, max_shift=0.0)).n_chains == graph.n_chains
     assert smooth_boundaries(graph, SmoothingOptions(4.0)).n_chains == graph.n_chains - 1
+
+
+def test_a_side_of_the_border_between_two_corners_stays_there() -> None:
+    """The junction on the left is joined with the corner; what is left of the top side are its two ends."""
+    mesh = mesh_image(np.array([[0], [2]], np.int32), MeshOptions(size=1.0, step=2.6, effort="fast"))
+    assert mesh.points.min(axis=0).tolist() == [0.0, 0.0]
+    assert mesh.points.max(axis=0).tolist() == [1.0, 2.0]
