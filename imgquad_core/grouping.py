@@ -1,10 +1,10 @@
-"""Group anything by anything: rows of a table whose lengths differ (CSR), running sums."""
+"""Group anything by anything: rows of a table whose lengths differ (CSR), running sums, disjoint sets."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .arrays import Ints
+from .arrays import Ints, Labels
 from .jit import kernel, verb
 
 
@@ -31,3 +31,24 @@ def grouped(faces: Ints, n_points: int) -> tuple[Ints, Ints]:
         corners[fill[v]] = i
         fill[v] += 1
     return offsets, corners
+
+
+@kernel
+def root_of(parent: Ints | Labels, k: int) -> int:
+    """Return the root of the disjoint set that `k` is in, its lowest number, halving the path to it."""
+    while parent[k] != k:
+        parent[k] = parent[parent[k]]
+        k = parent[k]
+    return k
+
+
+@verb
+def unite(parent: Ints | Labels, a: int, b: int) -> int:
+    """Unite the sets of `a` and `b` under the lower root; return the root that was given up, or -1 if they were one."""
+    low, high = root_of(parent, a), root_of(parent, b)
+    if low == high:
+        return -1
+    if low > high:
+        low, high = high, low
+    parent[high] = low
+    return high

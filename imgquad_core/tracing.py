@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from .arrays import Bytes, Flags, Floats, Ints, Labels
 from .errors import InputError
-from .fe.femesh import half_edge_twins
+from .geometry.halfedge import twins_of
 from .model import VOID, Materials, PointKind, QuadMesh
 
 SHARP = np.cos(np.radians(50.0))  #: a boundary that turns more at a node has a corner there
@@ -46,7 +46,7 @@ def trace_mesh(
     xy = np.asarray(points, np.float64)
     corners = _counter_clockwise(xy, np.asarray(quads, np.int64), folded)
     label = np.asarray(material, np.int32)
-    twin = half_edge_twins(corners, len(xy))
+    twin = twins_of(corners, len(xy))
     _assert_manifold(corners, len(xy))
     region, region_label = _regions(twin, label)
     beside = np.where(twin >= 0, region[twin // 4], VOID)

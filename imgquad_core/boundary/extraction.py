@@ -24,6 +24,7 @@ import numpy as np
 from imgquad_core.arrays import Bytes, Floats, Ints, Labels
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, corner_rule, joined_pair
+from imgquad_core.grouping import root_of, unite
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind
 
@@ -143,20 +144,6 @@ def _classify_corners(padded: Labels, rule: int) -> Bytes:
     return code
 
 
-@verb
-def _root(parent: Ints, k: int) -> int:
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
-
-
-@verb
-def _unite(parent: Ints, a: int, b: int) -> None:
-    a, b = _root(parent, a), _root(parent, b)
-    parent[max(a, b)] = min(a, b)
-
-
 @kernel
 def _label_runs(code: Bytes, labels: Labels, starts: Ints, rows: Ints) -> tuple[Ints, Ints]:
     """Region of each run of equal pixels in a row (-1 for void ones), and the first run of each region."""
@@ -170,15 +157,15 @@ def _label_runs(code: Bytes, labels: Labels, starts: Ints, rows: Ints) -> tuple[
         while above < rows[i] and here < rows[i + 1]:
             first = max(starts[above] - base_above, starts[here] - base)
             if code[i, first] & _RIGHT == 0:
-                _unite(parent, above, here)
+                unite(parent, above, here)
             end_above = starts[above + 1] - base_above if above + 1 < rows[i] else n_cols
             end = starts[here + 1] - base if here + 1 < rows[i + 1] else n_cols
             if end_above == end and end < n_cols:
                 what = code[i, end] & _WHAT
                 if what == _JOINS_AD:
-                    _unite(parent, above, here + 1)
+                    unite(parent, above, here + 1)
                 elif what == _JOINS_BC:
-                    _unite(parent, above + 1, here)
+                    unite(parent, above + 1, here)
             above += end_above <= end
             here += end <= end_above
     region = np.full(len(starts), -1, np.int64)
@@ -187,7 +174,7 @@ def _label_runs(code: Bytes, labels: Labels, starts: Ints, rows: Ints) -> tuple[
     for k in range(len(starts)):
         if labels[starts[k] // n_cols, starts[k] % n_cols] < 0:
             continue
-        root = _root(parent, k)
+        root = root_of(parent, k)
         if root == k:
             region[k] = n_regions
             first_run[n_regions] = k

@@ -26,8 +26,9 @@ from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
+from imgquad_core.geometry.halfedge import twins_of
 
-from .femesh import FEMesh, half_edge_twins
+from .femesh import FEMesh
 
 
 def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all") -> FEMesh:
@@ -119,7 +120,7 @@ def _chosen(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]]) -> list[tuple[
 
 def _cut_half_edges(mesh: FEMesh, chosen: list[tuple[int, int]]) -> tuple[Ints, Ints]:
     """Half-edges of chosen interfaces: of the material (the element) of lower number, ascending, and their twins."""
-    twin = half_edge_twins(mesh.cells[:, :4], mesh.n_points)
+    twin = _twins_of_sides(mesh)
     own, other = mesh.cell_material[np.arange(len(twin)) // 4], mesh.cell_material[twin // 4]
     is_inside = any(a == b for a, b in chosen)
     first = (own < other) | ((own == other) & (np.arange(len(twin)) < twin) & is_inside)
@@ -140,6 +141,10 @@ def _cut_half_edges(mesh: FEMesh, chosen: list[tuple[int, int]]) -> tuple[Ints, 
     if not len(lower):
         raise InputError("cohesive: no two materials touch, there is nothing to split")
     return lower, twin[lower]
+
+
+def _twins_of_sides(mesh: FEMesh) -> Ints:
+    return twins_of(np.ascontiguousarray(mesh.cells[:, :4]), mesh.n_points)
 
 
 def _split_nodes(mesh: FEMesh, group: Ints, cut: Ints, upper: Ints) -> tuple[Ints, Ints]:
@@ -177,7 +182,7 @@ def _groups_of_corners(mesh: FEMesh, cut: Ints) -> Ints:
     Corners around a node are of one group where their elements share an edge that is not cut, or the seam.
     """
     n = 4 * mesh.n_cells
-    twin = half_edge_twins(mesh.cells[:, :4], mesh.n_points)
+    twin = _twins_of_sides(mesh)
     twin[cut] = -1
     tail = np.flatnonzero(twin >= 0)
     head_of_twin = twin[tail] // 4 * 4 + (twin[tail] + 1) % 4
@@ -202,7 +207,7 @@ def _corners_across(mesh: FEMesh, pairs: Ints) -> Ints:
     tails = mesh.cells[:, :4].ravel()
     heads = np.roll(mesh.cells[:, :4], -1, axis=1).ravel()
     next_corner = np.arange(len(tails)) // 4 * 4 + (np.arange(len(tails)) + 1) % 4
-    outer = np.flatnonzero(half_edge_twins(mesh.cells[:, :4], mesh.n_points) < 0)
+    outer = np.flatnonzero(_twins_of_sides(mesh) < 0)
     near = outer[(partner[tails[outer]] >= 0) & (partner[heads[outer]] >= 0)]
     key = heads[outer] * mesh.n_points + tails[outer]
     order = np.argsort(key)

@@ -168,16 +168,6 @@ class FEMesh(Value):
         }
 
 
-def half_edge_twins(quads: Ints, n_points: int) -> Ints:
-    """Return the twin of half-edge ``4 q + k``, from ``quads[q, k]`` to ``quads[q, (k + 1) % 4]``; -1 on a border."""
-    tails, heads = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
-    forward, backward = tails * n_points + heads, heads * n_points + tails
-    order = np.argsort(forward)
-    at = np.minimum(np.searchsorted(forward, backward, sorter=order), len(order) - 1)
-    twin = order[at]
-    return np.where(forward[twin] == backward, twin, -1)
-
-
 def nodes_of_sides(mesh: FEMesh) -> dict[str, Ints]:
     """Return the node sets of `mesh`, those named like a side set made anew from its sides."""
     return {

@@ -11,9 +11,10 @@ from scipy.sparse import coo_array
 
 from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
+from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.model import PointKind, QuadMesh
 
-from .femesh import FEMesh, Names, half_edge_twins, name_materials
+from .femesh import FEMesh, Names, name_materials
 
 BORDERS = ("left", "right", "bottom", "top")
 CORNERS = ("bottom_left", "bottom_right", "top_right", "top_left")
@@ -108,7 +109,7 @@ def _sides(half_edges: Ints) -> Ints:
 
 def _named_sides(mesh: QuadMesh, names: dict[int, str]) -> Iterator[tuple[str, Ints, bool]]:
     """(name, sides, are its nodes a set too) of borders, interfaces and free borders, each in a fixed order."""
-    twin = half_edge_twins(mesh.quads, mesh.n_points)
+    twin = twins_of(mesh.quads, mesh.n_points)
     outer = np.flatnonzero(twin < 0)
     border = _border_of(mesh, _ends(mesh, outer))
     for b, name in enumerate(BORDERS):
@@ -158,7 +159,7 @@ def _corner_sets(mesh: QuadMesh, node_sets: dict[str, Ints]) -> dict[str, Ints]:
 
 def _at_interfaces(mesh: QuadMesh, names: dict[int, str]) -> dict[str, Ints]:
     """Elements with a node on an interface: of each two materials, and of all."""
-    twin = half_edge_twins(mesh.quads, mesh.n_points)
+    twin = twins_of(mesh.quads, mesh.n_points)
     inner = np.flatnonzero(twin >= 0)
     own, other = mesh.quad_material[inner // 4], mesh.quad_material[twin[inner] // 4]
     lower = inner[own < other]

@@ -8,6 +8,7 @@ import numpy as np
 
 from imgquad_core.arrays import Labels
 from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, joined_pair
+from imgquad_core.grouping import unite
 from imgquad_core.jit import kernel
 
 
@@ -33,23 +34,12 @@ def labelled_clusters(colors: Labels, rule: int) -> Clusters:
 
 
 @kernel
-def find(parent: Labels, p: int) -> int:
-    """Return the root of pixel `p`, halving the path to it."""
-    while parent[p] != p:
-        parent[p] = parent[parent[p]]
-        p = parent[p]
-    return p
-
-
-@kernel
 def join(clusters: Clusters, p: int, q: int) -> int:
     """Unite the clusters of two pixels; return the root that was given up, or -1 if they were one."""
-    low, high = find(clusters.parent, p), find(clusters.parent, q)
-    if low == high:
+    high = unite(clusters.parent, p, q)
+    if high < 0:
         return -1
-    if low > high:
-        low, high = high, low
-    clusters.parent[high] = low
+    low = clusters.parent[high]
     clusters.pixels[low] += clusters.pixels[high]
     clusters.follower[clusters.last[low]] = high
     clusters.last[low] = clusters.last[high]

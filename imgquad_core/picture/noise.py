@@ -14,10 +14,11 @@ import numpy as np
 from imgquad_core.arrays import Ints, Labels
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, corner_rule, joined_pair
+from imgquad_core.grouping import root_of
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage
 
-from .clusters import Clusters, find, join, labelled_clusters
+from .clusters import Clusters, join, labelled_clusters
 from .options import DenoiseOptions
 
 
@@ -246,7 +247,7 @@ def merged_roots(clusters: Clusters, queue: Queue, size: int, roots: Labels) -> 
     n = 0
     p = queue.merged[size]
     while p >= 0:
-        roots[n] = find(clusters.parent, p)
+        roots[n] = root_of(clusters.parent, p)
         n += 1
         p = queue.earlier[p]
     return n
@@ -262,7 +263,7 @@ def neighbour_color(colors: Labels, clusters: Clusters, scratch: Scratch, root: 
         for q in sides(p, colors.shape[0], colors.shape[1]):
             if q >= 0 and flat[q] != flat[root] and flat[q] != VOID:
                 border[flat[q]] += 1
-                largest[flat[q]] = max(largest[flat[q]], clusters.pixels[find(clusters.parent, q)])
+                largest[flat[q]] = max(largest[flat[q]], clusters.pixels[root_of(clusters.parent, q)])
         p = clusters.follower[p]
     best = VOID
     p = root
@@ -317,7 +318,7 @@ def farthest(colors: Labels, clusters: Clusters, scratch: Scratch, start: int) -
     """Return the pixel of a cluster that is the most steps from `start`, and the number of pixels on the way."""
     distance, front = scratch.distance, scratch.front
     rows, cols = colors.shape
-    root = find(clusters.parent, start)
+    root = root_of(clusters.parent, start)
     flat = colors.ravel()
     front[0] = start
     distance[start] = 1
@@ -328,7 +329,7 @@ def farthest(colors: Labels, clusters: Clusters, scratch: Scratch, start: int) -
         for i in range(max(r - 1, 0), min(r + 2, rows)):
             for j in range(max(c - 1, 0), min(c + 2, cols)):
                 q = i * cols + j
-                if distance[q] == 0 and flat[q] == flat[p] and find(clusters.parent, q) == root:
+                if distance[q] == 0 and flat[q] == flat[p] and root_of(clusters.parent, q) == root:
                     distance[q] = distance[p] + 1
                     front[n] = q
                     n += 1
@@ -386,7 +387,7 @@ def merge(clusters: Clusters, queue: Queue, p: int, q: int) -> None:
     given_up = join(clusters, p, q)
     if given_up < 0:
         return
-    count = clusters.pixels[find(clusters.parent, given_up)]
+    count = clusters.pixels[root_of(clusters.parent, given_up)]
     if count < len(queue.merged):
         queue.earlier[given_up] = queue.merged[count]
         queue.merged[count] = given_up

@@ -9,12 +9,13 @@ import pytest
 from scipy.ndimage import label as connected
 
 from imgquad_core.geometry.corner_rule import DIAGONAL, JUNCTION, POLICIES
-from imgquad_core.picture.clusters import Clusters, find, join, labelled_clusters
+from imgquad_core.grouping import root_of
+from imgquad_core.picture.clusters import Clusters, join, labelled_clusters
 from support.labels import Labels, any_labels
 
 
 def roots(clusters: Clusters) -> Labels:
-    return np.array([find(clusters.parent, p) for p in range(len(clusters.parent))], np.int32)
+    return np.array([root_of(clusters.parent, p) for p in range(len(clusters.parent))], np.int32)
 
 
 def members(clusters: Clusters, root: int) -> list[int]:
