@@ -18,7 +18,7 @@ from imgquad_core.arrays import Floats, Ints
 from imgquad_core.chains import Places, places_of
 from imgquad_core.model import BoundaryGraph
 
-_STEPS = 5
+_STEPS = 5  # of Newton towards the wanted areas, at most; most end sooner, at `_GOOD`
 _SMALL = 50  # px; smaller regions take what cannot be given to all
 _SHARPEST = 0.2  # 1 + cos of the largest turn that is mitred, 143 degrees
 _GOOD = 1e-4  # share of a region's area that may stay missing

@@ -17,11 +17,11 @@ from .curves import Curves
 from .feature_size import local_feature_size
 
 _FINEST = 0.5  # px, smallest edge length asked for in thin places; pixels leave none under 0.7 px
-_FINEST_BEND = 1.0  # and where the curve only bends
+_FINEST_BEND = 1.0  # px, smallest length asked for because of a bend alone: a pixel's side, bends below are stairs
 _ACROSS = 1.0  # edge length over local feature size: coarse segments are at most twice as long as the place is wide
 _BEND = 4.0  # arc over distance of a foreign point; chains that meet at more than 29 degrees do not count as thin
-_TURN = 0.55  # radians from one edge to the next
-_PAST_ENDS = 2  # ends of chains that a fine place reaches past
+_TURN = 0.55  # radians that the curve may turn from one edge to the next, 32 degrees: 11 edges on a circle
+_PAST_ENDS = 2  # junctions past which a fine place still makes edges shorter, on the chains that go on there
 _OVER = 2.0  # px of arc to each side over which the bend is measured
 
 

@@ -23,8 +23,8 @@ from imgquad_core.jit import kernel, verb
 WINDOWS = (3.0, 4.5, 6.5, 9.5, 14.0, 20.0, 30.0, 45.0, 65.0)  #: half widths that are tried, px of arc
 STAIR_NOISE = 0.33  #: px; steps of a digital straight line have a deviation of 1 / sqrt(12) = 0.289, some more
 _EVERY = 4  # windows are chosen at every 4th point
-_DARING = 20.0  # wider ones only if the last two did
-_SLOPE = 0.5  # and change by this much a px of arc
+_DARING = 20.0  # px; a window wider than this is tried only if not both of the last two narrower ones failed
+_SLOPE = 0.5  # px that the half width of the window may grow a px of arc, so that neighbours average alike
 _SINGULAR = 1e-9  # least determinant of moments over the product of their diagonal: two samples fix no quadratic
 _WIDER = 1.5  # window of the quartic over that of the quadratic: the same noise
 _DETAIL, _WIDE = 6.5, 14.0  # px; windows below the one keep quadratics, above the other they get quartics

@@ -27,7 +27,7 @@ _LONG = 2.3  # coarse segments from which a piece gets an even number of them, f
 _SHORT = 0.7  # the same beside a corner: a short piece there would keep both faces of a long chain from that
 _COARSE = 0.3  # mean size over asked size from which that is of use
 _VERY_LONG = 30.0  # coarse segments from which their number may be made a multiple of six
-_SWEEPS = 3
+_SWEEPS = 3  # over the nodes of a chain that even out its edges: each goes halfway, so an eighth of the way is left
 _LEAST_SECTOR = np.radians(35.0)  # sharper sectors are blunted; tips of chains are rounded below 37 degrees
 
 

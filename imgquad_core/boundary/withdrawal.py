@@ -22,10 +22,12 @@ from .edge_sizes import grade_along, grade_chains
 from .nodes import Level, Nodes, any_of_chain, even_out, level_of, mark_conflicts, number_nodes, place_nodes, points_at
 
 _CLOSER, _LESS_CLOSE = 0.6, 0.8  # factors on the wanted length, at crossings and at sharp sectors
-_CLOSEST = 0.25  # px between nodes, and no less
-_AREA_ROOM = 0.7  # of the bound of smoothing, for the shift that restores areas
-_AREA_ROUNDS = 10
-_KINK = 0.3  # by how much the shift for areas may change along a chain, over the length
+_CLOSEST = 0.25  # px, least wanted length of an edge: half the 0.5 px of thin places, as pixels leave 0.7 px
+_AREA_ROOM = 0.7  # of how far smoothing could move a point: the shift for areas leaves the rest as a gap to others
+_AREA_ROUNDS = (
+    10  # of shifting and testing; a bound in conflict is halved once, then 0: after these nodes stay as placed
+)
+_KINK = 0.3  # px of shift for areas that may come or go in a px of arc: a turn of at most 17 degrees
 
 
 class Patience(NamedTuple):

@@ -40,7 +40,7 @@ from .faces import FaceQuads
 from .options import CleanUp
 from .patterns import MAX_CORNERS, POINTS, QUADS, Canvas, choose_cut, cut_quads, draw_cut, piece_fits, smooth_drawn
 
-TRIAL_SWEEPS = 5
+TRIAL_SWEEPS = 5  # of smoothing a new pattern before it is judged; the whole mesh is smoothed later
 SMALLEST_SHARE, LARGEST_SHARE = 0.15, 4.0  # of a new quad's area in the mean of the cavity
 FEWEST, MOST = 0.7, 1.4  # new quads per old quad
 FLAT = 2  # quads beside a side of a pattern

@@ -25,7 +25,7 @@ import numpy as np
 from imgquad_core.arrays import Floats, Ints
 from imgquad_core.jit import inlined, kernel, verb
 
-MAX_CORNERS = 6
+MAX_CORNERS = 6  # of an outline that is filled: there are patterns for two to six
 
 
 POINTS, QUADS = range(2)  #: places of what `Canvas.tally` counts

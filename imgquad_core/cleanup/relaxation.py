@@ -24,8 +24,8 @@ GOOD = 0.9  # Newton works on rings with a quad below this
 BAD = 0.35  # the pattern search works on rings below this
 SHORT = 0.25  # of the longest edge at a node: the pattern search makes no edge there shorter, for angles alone
 POWER = 4  # of the inverse mean ratio in Newton's energy
-HALVINGS = 6
-TINY = 1e-300
+HALVINGS = 6  # of a Newton step that makes things worse, until the node stays: 1/64 of the step is not worth it
+TINY = 1e-300  # added where lengths divide, so that a side of no length gives 0 and no NaN
 WAYS = np.array([[np.cos(d * np.pi / 4), np.sin(d * np.pi / 4)] for d in range(8)])  # of the pattern search
 
 

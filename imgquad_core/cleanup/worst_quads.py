@@ -43,11 +43,11 @@ LARGEST = 24  # quads of a cavity
 LONGEST = 16  # nodes of an outline
 LEAST_GAIN = 0.02  # of the worst scaled Jacobian
 ANY = 99  # quads that a node of the outline may need: valences do not count here
-ROUNDS = 3
+ROUNDS = 3  # over the poor quads, at most: a replaced one may make room for the next
 COLLAPSE = 6  # the first of the two cavities in which the quad is collapsed
 CAVITIES = COLLAPSE + 2  # that are tried around a quad, see `_grow`
 FILLINGS = 3  # of an outline: without a new node, or a star on its even or on its odd nodes
-CENTRE_STEPS = 8
+CENTRE_STEPS = 8  # of the pattern search for the best place of a new node; it narrows to 0.6 where none is better
 
 
 class Tables(NamedTuple):

@@ -24,7 +24,7 @@ from .cutting import CutMesh
 WORST_PAIR = 0.25  # scaled Jacobian below which two triangles stay apart
 WORST_AUGMENTED = 0.5  # the same for pairs made by augmentation, which would bring bad pairs back
 WIDE_CORNER = -0.6  # cosine: no pair may have a corner wider than 127 degrees on a constraint
-AUGMENTATIONS = 3
+AUGMENTATIONS = 3  # passes over the triangles left over, at most; it ends with the first that pairs none
 
 
 def compose(mesh: CutMesh) -> Ints:

@@ -22,8 +22,8 @@ from imgquad_core.jit import kernel
 from .cutting import CutMesh
 
 SWEEPS = 12  # the field has converged after 5 to 10 (study: 5, 30 and 100 sweeps give the same mesh)
-OVER_RELAXATION = 1.5
-MAX_SIZE_SWEEPS = 50
+OVER_RELAXATION = 1.5  # of each sweep: 1 is Gauss-Seidel, from 2 on it diverges
+MAX_SIZE_SWEEPS = 50  # to and fro over the points, each carries sizes on; it ends with the first that changes none
 
 
 class CrossField(NamedTuple):

@@ -21,7 +21,7 @@ from imgquad_core.geometry.quad_shape import nodes_of_poor, sector_angles
 from .splitting import points_between, split_quads
 from .triangulation import Constraints
 
-FIT_ROUNDS = 6
+FIT_ROUNDS = 6  # in which the rim goes to its places, each as far as no quad folds
 DRAFT, FULL, AGAIN = (3, 0), (8, 6), (3, 6)  # sweeps of Laplace and of Newton: before the clean-up, after it, again
 RETRIED = 6  # quads beside a seam within which the clean-up of a large face looks again
 ROOM = 10  # quads around a place that its cavities can reach

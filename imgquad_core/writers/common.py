@@ -16,7 +16,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.fe.femesh import FEMesh, Names
 from imgquad_core.whole_files import replacing
 
-ROWS_AT_ONCE = 20_000
+ROWS_AT_ONCE = 20_000  # rows formatted in one go: a few MB of text in memory
 
 
 def write_text(path: str | Path, parts: Iterable[str]) -> None:

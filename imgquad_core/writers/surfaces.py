@@ -12,6 +12,7 @@ from imgquad_core.fe.femesh import FEMesh
 from imgquad_core.whole_files import replacing
 
 from .common import refuse_3d, refuse_cohesive, rows, safe_names, write_text
+from .ply import ply_bytes
 
 
 def write_obj(mesh: FEMesh, path: str | Path) -> None:
@@ -39,23 +40,11 @@ def write_off(mesh: FEMesh, path: str | Path) -> None:
 def write_ply(mesh: FEMesh, path: str | Path) -> None:
     """Write a Stanford file (``.ply``, binary little endian): quads with colours and the material number."""
     points, faces = _corners(mesh, "PLY")
-    face = np.empty(
-        len(faces), [("n", "u1"), ("corners", "<i4", faces.shape[1]), ("color", "u1", 3), ("material", "<i4")]
-    )  # packed, as the header says
-    face["n"], face["corners"], face["color"], face["material"] = (
-        faces.shape[1],
-        faces,
-        _colors(mesh),
-        mesh.cell_material,
-    )
-    header = (
-        f"ply\nformat binary_little_endian 1.0\ncomment imgquad-mesh\nelement vertex {len(points)}\n"
-        "property double x\nproperty double y\nproperty double z\n"
-        f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int material\nend_header\n"
-    )
+    offsets = np.arange(len(faces) + 1) * faces.shape[1]
+    of_faces = {**dict(zip(("red", "green", "blue"), _colors(mesh).T, strict=True)), "material": mesh.cell_material}
+    whole = ply_bytes("imgquad-mesh", dict(zip("xyz", points.T, strict=True)), (offsets, faces.ravel()), of_faces)
     with replacing(path) as temporary:
-        temporary.write_bytes(header.encode() + points.astype("<f8").tobytes() + face.tobytes())
+        temporary.write_bytes(whole)
 
 
 def write_stl(mesh: FEMesh, path: str | Path) -> None:

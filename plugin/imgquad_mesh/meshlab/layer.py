@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Bytes, Floats, Ints, Labels
+from imgquad_core.writers.ply import ply_bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,75 +103,27 @@ def write_ply(layer: Layer, path: Path) -> None:
     path : Path
         The file; it is overwritten.
     """
-    points = _point_records(layer)
-    header = ["ply", "format binary_little_endian 1.0", f"comment {_one_line(layer.label)}"]
-    header += [f"element vertex {len(points)}", *_properties(points.dtype)]
-    faces = b""
-    if layer.n_faces:
-        extra = _face_extras(layer)
-        header += [f"element face {layer.n_faces}", "property list uchar int vertex_indices", *_properties(extra.dtype)]
-        faces = _face_bytes(layer, extra)
-    if len(layer.edges):
-        header += [f"element edge {len(layer.edges)}", "property int vertex1", "property int vertex2"]
-    edges = layer.edges.astype("<i4").tobytes()
-    text = "\n".join([*header, "end_header", ""])
-    path.write_bytes(text.encode("ascii", "replace") + points.tobytes() + faces + edges)
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split()) or "imgquad-mesh"
-
-
-_PLY_TYPES = {"<f8": "double", "|u1": "uchar", "<i4": "int"}
-
-
-def _properties(dtype: np.dtype[Any]) -> list[str]:
-    names = dtype.names or ()
-    return [f"property {_PLY_TYPES[dtype[name].str]} {name}" for name in names]
-
-
-def _records(n: int, columns: dict[str, NDArray[Any]]) -> NDArray[Any]:
-    records = np.empty(n, [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()])
-    for name, values in columns.items():
-        records[name] = values
-    return records
+    corners = (layer.face_offsets, layer.face_points)
+    comment = " ".join(layer.label.split()) or "imgquad-mesh"
+    path.write_bytes(ply_bytes(comment, _of_points(layer), corners, _of_faces(layer), layer.edges))
 
 
 def _color_columns(color: Bytes | None) -> dict[str, NDArray[Any]]:
     return {} if color is None else dict(zip(("red", "green", "blue", "alpha"), color.T, strict=True))
 
 
-def _point_records(layer: Layer) -> NDArray[Any]:
+def _of_points(layer: Layer) -> dict[str, NDArray[Any]]:
     columns: dict[str, NDArray[Any]] = dict(zip("xyz", layer.points.T, strict=True)) | _color_columns(layer.point_color)
-    if layer.point_scalar is not None:
-        columns["quality"] = layer.point_scalar
-    return _records(len(layer.points), columns)
+    return columns if layer.point_scalar is None else columns | {"quality": layer.point_scalar}
 
 
-def _face_extras(layer: Layer) -> NDArray[Any]:
+def _of_faces(layer: Layer) -> dict[str, NDArray[Any]]:
     columns = _color_columns(layer.face_color)
     if layer.face_scalar is not None:
         columns["quality"] = layer.face_scalar
     if layer.material is not None:
         columns["material"] = layer.material.astype(np.int32)
-    return _records(layer.n_faces, columns)
-
-
-def _face_bytes(layer: Layer, extra: NDArray[Any]) -> bytes:
-    """Return the face records: they differ in length, so those of each number of corners are put in their places."""
-    sizes = layer.face_sizes
-    lengths = 1 + 4 * sizes + extra.dtype.itemsize
-    starts = np.concatenate([[0], np.cumsum(lengths)])
-    out = np.empty(int(starts[-1]), np.uint8)
-    for size in np.unique(sizes):
-        rows = np.flatnonzero(sizes == size)
-        records = np.empty(len(rows), [("n", "u1"), ("corners", "<i4", (int(size),)), ("extra", extra.dtype)])
-        records["n"] = size
-        records["corners"] = layer.face_points[layer.face_offsets[rows, None] + np.arange(size)]
-        records["extra"] = extra[rows]
-        length = records.dtype.itemsize
-        out[starts[rows, None] + np.arange(length)] = records.view(np.uint8).reshape(len(rows), length)
-    return out.tobytes()
+    return columns
 
 
 def layer_of(mesh: Any) -> Layer:
