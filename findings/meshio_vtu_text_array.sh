@@ -4,6 +4,7 @@
 # VTK has text arrays (vtkStringArray) and writes them so; PyVista puts a str into field_data that way.
 # Expected: the grid, without or with the array; or an error that `except Exception` catches.
 # Seen: prints "Illegal data type 'String'." and raises SystemExit(1). Without the one array the file is read.
+# We write texts as bytes there, and turn them back in a reader of our own for PyVista (imgquad_mesh/readers.py).
 # There is no other place for the array: VTK looks for FieldData among the children of UnstructuredGrid only.
 set -euo pipefail
 folder=$(mktemp -d)

@@ -16,7 +16,7 @@ import pyvista as pv
 from . import filters
 
 if not hasattr(pv, "register_dataset_accessor"):
-    raise ImportError(f"imgquad-mesh needs PyVista 0.48 or newer, this is {pv.__version__}: pip install -U pyvista")
+    raise ImportError(f"imgquad-mesh needs PyVista 0.49 or newer, this is {pv.__version__}: pip install -U pyvista")
 D = TypeVar("D")
 R = TypeVar("R")
 P = ParamSpec("P")

@@ -41,7 +41,7 @@ def add_element_options(parser: argparse.ArgumentParser) -> None:
         "out the sides that two materials share, for programs that take all named sides for the boundary",
     )
     add("--msh-version", dest="version_", metavar="V", help="4.1 (default) or 2.2: .msh")
-    add("--plain", action="store_true", default=None, help="numbers only, for meshio, SfePy, FElupe, MFEM: .vtu .vtk")
+    add("--plain", action="store_true", default=None, help="numbers only, materials from 1: .vtu .vtk (SfePy, MFEM)")
 
 
 def element_options(args: argparse.Namespace) -> ElementOptions:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from imgquad_core.model import Materials
 from imgquad_core.reading import Calibration
 
+from .field_texts import put_texts, texts_of
+
 NUMBERS, NAMES, COLORS = MATERIAL_FIELDS = ("material_numbers", "material_names", "material_colors")
 #: of grains: phase and Bunge's Euler angles (degrees, NaN where unknown) of each
 PHASES, ORIENTATIONS = CRYSTAL_FIELDS = ("material_phases", "material_orientations")
@@ -19,10 +21,10 @@ PHASES, ORIENTATIONS = CRYSTAL_FIELDS = ("material_phases", "material_orientatio
 def put_materials(dataset: pv.DataSet, materials: Materials) -> None:
     """Store what the materials are called in the field arrays of a dataset, in place."""
     dataset.field_data[NUMBERS] = materials.labels
-    dataset.field_data[NAMES] = list(materials.names)
+    put_texts(dataset, NAMES, materials.names)
     dataset.field_data[COLORS] = materials.colors
     if materials.phases is not None:
-        dataset.field_data[PHASES] = list(materials.phases)
+        put_texts(dataset, PHASES, materials.phases)
     if materials.orientations is not None:
         dataset.field_data[ORIENTATIONS] = materials.orientations
 
@@ -31,7 +33,7 @@ def materials_of(dataset: pv.DataSet, present: NDArray[Any] | None = None) -> Ma
     """Return what `put_materials` stored; grey ones without names for the numbers `present` where nothing is stored."""
     fields = dataset.field_data
     if present is None or (NUMBERS in fields and NAMES in fields):
-        names = tuple(map(str, fields[NAMES]))
+        names = texts_of(fields[NAMES])
         colors = fields[COLORS] if COLORS in fields else _grey(len(names))
         return Materials(fields[NUMBERS], names, colors, *_crystals(fields))
     numbers = np.unique(present)
@@ -43,7 +45,7 @@ def _grey(n: int) -> NDArray[np.uint8]:
 
 
 def _crystals(fields: Any) -> tuple[tuple[str, ...] | None, NDArray[Any] | None]:
-    phases = tuple(map(str, fields[PHASES])) if PHASES in fields else None
+    phases = texts_of(fields[PHASES]) if PHASES in fields else None
     return phases, fields.get(ORIENTATIONS, None)
 
 
@@ -72,6 +74,6 @@ def put_calibration(
     if size is not None:
         dataset.field_data["file_pixel_size"] = [size.x, size.y]
         for name, text in (("unit", size.unit), ("source", size.source), ("doubt", size.doubt)):
-            dataset.field_data[f"file_pixel_size_{name}"] = [text]
+            put_texts(dataset, f"file_pixel_size_{name}", [text])
     if found.crs:
-        dataset.field_data["crs"] = [found.crs]
+        put_texts(dataset, "crs", [found.crs])

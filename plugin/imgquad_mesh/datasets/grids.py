@@ -112,7 +112,7 @@ def to_mesh(grid: pv.UnstructuredGrid | pv.PolyData) -> tuple[QuadMesh, Placemen
         level.cell_data["material"] = grid.cell_data["material"]
     for name in MATERIAL_FIELDS:
         if name in grid.field_data:
-            level.field_data[name] = grid.field_data[name]
+            level.GetFieldData().AddArray(grid.GetFieldData().GetAbstractArray(name))
     return from_grid(level, folded=True), plane
 
 

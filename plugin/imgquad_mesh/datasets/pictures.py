@@ -15,6 +15,7 @@ from imgquad_core.reading.formats import read_picture
 from imgquad_core.reading.options import ReadOptions
 from imgquad_core.reading.picture import Picture
 
+from .field_texts import put_texts
 from .fields import put_calibration, put_materials
 from .images import MATERIAL, OPAQUE, PALETTE, PICTURE, VOID_PIXELS
 from .vtk_files import EXTENSIONS, read_vtk
@@ -66,7 +67,7 @@ def to_image(picture: Picture) -> pv.ImageData:
     rows, cols = picture.shape
     image = pv.ImageData(dimensions=(cols + 1, rows + 1, 1))
     put_calibration(image, picture.calibration)
-    image.field_data["notes"] = list(picture.notes) or [""]
+    put_texts(image, "notes", picture.notes or [""])
     if picture.labels:
         labels = as_told(segment_picture(picture).image, picture)
         image.cell_data[MATERIAL] = _upwards(labels.labels)

@@ -93,12 +93,14 @@ def write_mesh_file(
     if options.pop("plain", False):
         _write_plain(made or fe_mesh(mesh), path)
     elif path.suffix.lower() in GRID_EXTENSIONS:
+        from imgquad_mesh.datasets.field_texts import for_vtu
         from imgquad_mesh.datasets.grids import to_fe_grid, to_grid
 
         grid = to_fe_grid(made) if made else to_grid(mesh)
         if complete:
             complete(grid)
-        replace_file(path, lambda temporary: save_dataset(grid, temporary))
+        saved = for_vtu(grid) if path.suffix.lower() == ".vtu" else grid
+        replace_file(path, lambda temporary: save_dataset(saved, temporary))
     else:
         from imgquad_core.writers import write_mesh
 

@@ -1,0 +1,89 @@
+"""Texts in the field arrays of a dataset: as VTK has them, and as tables of bytes in a ``.vtu``.
+
+meshio ends the process at a text array in a ``.vtu``: texts go there as bytes, and are texts again when PyVista reads.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+#: what a name of a component cannot hold: VTK writes it into the file without escapes
+UNSAFE = re.compile(r'[<>&"\s\x00-\x1f]+')
+
+
+def put_texts(dataset: pv.DataObject, name: str, texts: Iterable[str]) -> None:
+    """Store texts in a field array, in place. PyVista refuses other letters than ASCII there; VTK takes them."""
+    from vtkmodules.vtkCommonCore import vtkStringArray
+
+    array = vtkStringArray()
+    array.SetName(name)
+    for text in texts:
+        array.InsertNextValue(text.encode("utf-8", "replace").decode())
+    dataset.GetFieldData().AddArray(array)
+
+
+def texts_of(array: NDArray[Any]) -> tuple[str, ...]:
+    """Return the texts of a field array, be it of texts or a table of their bytes (read without our reader)."""
+    values = np.asarray(array)
+    return tuple(map(str, values if values.dtype != np.uint8 else _texts(values) or ()))
+
+
+def for_vtu(dataset: pv.DataSet) -> pv.DataSet:
+    """Return a shallow copy with bytes for text arrays of field data: a text a column, UTF-8, filled up with 0.
+
+    Each column is named by its text, too, so that ParaView shows it and an editor finds it in the file. Names of other
+    arrays are escaped, as VTK does not: a set of a material "a<b" would spoil the file.
+    """
+    copy = dataset.copy(deep=False)
+    for arrays in (copy.point_data, copy.cell_data):
+        for name in [name for name in arrays.keys() if name != quoted(name)]:  # noqa: SIM118
+            arrays[quoted(name)] = arrays.pop(name)
+    for name in copy.field_data.keys():  # noqa: SIM118
+        values = np.atleast_1d(copy.field_data[name])
+        if values.dtype.kind == "U" and values.size:
+            texts = values.ravel().tolist()
+            copy.field_data[name] = _table(texts)
+            array = copy.GetFieldData().GetAbstractArray(name)
+            for column, text in enumerate(texts):
+                array.SetComponentName(column, _label(text))
+    return copy
+
+
+def restore_texts(dataset: pv.DataObject) -> None:
+    """Turn tables of bytes back into text arrays, in place: only where the columns are named by what they hold."""
+    fields = dataset.GetFieldData()
+    for array in [fields.GetAbstractArray(index) for index in range(fields.GetNumberOfArrays())]:
+        if array.GetDataTypeAsString() == "unsigned char" and array.HasAComponentName():
+            texts = _texts(pv.convert_array(array))
+            names = [array.GetComponentName(column) for column in range(array.GetNumberOfComponents())]
+            if texts is not None and names == [_label(text) for text in texts]:
+                put_texts(dataset, array.GetName(), texts)
+
+
+def _table(texts: list[str]) -> NDArray[np.uint8]:
+    columns = [text.encode() for text in texts]
+    width = max(1, *map(len, columns))
+    return np.frombuffer(b"".join(column.ljust(width, b"\0") for column in columns), np.uint8).reshape(-1, width).T
+
+
+def _texts(table: NDArray[np.uint8]) -> list[str] | None:
+    try:
+        return [bytes(column).rstrip(b"\0").decode() for column in table.reshape(len(table), -1).T]
+    except UnicodeDecodeError:
+        return None
+
+
+def quoted(name: str) -> str:
+    """Return a name as it stands in an attribute of XML."""
+    return escape(name, {'"': "&quot;"})
+
+
+def _label(text: str) -> str:
+    return UNSAFE.sub(" ", text) or " "  # no name at all would tell nothing
