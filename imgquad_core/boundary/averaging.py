@@ -3,9 +3,17 @@
 Each chain is averaged by a bell as wide, turned about its ends, and sampled anew at every three quarters
 of it. Coordinates are then counted in widths: what smooths stairs of a pixel afterwards smooths these.
 
-Chains keep their points where any of these, or the new chain beside it, would be farther off than a share of the
-distance to foreign parts: so none jumps over an island. Those that cross others all the same keep theirs, too, and
-those that would leave a node in another order, or turn a region inside out: thin parts stay as they are.
+A place where foreign parts are near gets a narrower bell and closer samples, down to the pixels themselves, and the
+width grows away from it along the chain::
+
+    width     ------.           .------      foreign: an island, the other side of a neck, another chain at a node
+                     '.       .'
+                       '.___.'
+    samples   o     o    o o.....o o    o     o
+
+Points go at most half-way to foreign parts. Where the new chain is farther off than that all the same, where it
+crosses others, leaves a node in another order or turns a region inside out, the width is halved, until it does not: so
+thin parts stay as they are, and what is wide is smoothed beside them.
 """
 
 from __future__ import annotations
@@ -18,20 +26,26 @@ import numpy as np
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.conflicts import CROSSING, find_conflicts, snapped
 from imgquad_core.jit import kernel, verb
-from imgquad_core.model import PointKind
+from imgquad_core.model import BoundaryGraph, PointKind
 
 from .areas import enclosed_areas
-from .curves import ELSEWHERE, PIXEL_CORNER, Curves, PixelChains, curves_of, numbered
+from .curves import ELSEWHERE, PIXEL_CORNER, Curves, Ends, PixelChains, curves_of, numbered, per_point
+from .edge_sizes import grade_along
 from .feature_size import local_feature_size
 from .joins import rings
+from .nodes import divide
 
 _BELL = 1.05  # of the width, deviation of the bell
 _REACH = 4.0  # widths, in which foreign parts are looked for
 _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are
 _ENDS = 3.0  # deviations to either side
 _EVERY = 0.75  # of the width, from sample to sample along the stairs
+_NARROWEST = 1.0  # data points; places that need less keep their pixels
+_OF_FREE = 0.5  # width over the distance to foreign parts
+_WIDENS = 0.5  # of the width, a unit of length along the chain
 _ROOM = 0.49  # of the distance to foreign parts: two points that both go that far do not meet
 _ARC_RATIO = 2.0  # arc over distance of a foreign point
+_ROUNDS = 12  # of halving widths; afterwards whole chains keep their pixels
 
 
 def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelChains:
@@ -52,37 +66,43 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
         The same chains, coordinates and picture divided by `width`.
     """
     curves, ends = curves_of(*chains)
-    room = _ROOM * local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
-    stays = _strays(curves, room, *_sample(curves, room, np.zeros(len(curves.ends), bool), width))
-    # as the points are rounded, so that what lies on the border lies on it exactly
-    cols, rows = snapped(np.array(chains.graph.shape[::-1]) / width, units * width).tolist()
+    free = local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
+    room = _ROOM * free
+    is_tiny = (curves.ends[:, 0] < 0) & (np.diff(curves.offsets) <= _SHORTEST_LOOP)
+    scale = np.where(per_point(curves, is_tiny), 0.0, np.minimum(width, _OF_FREE * free))
+    scale[scale < _NARROWEST] = 0.0
+    scale = grade_along(scale, curves.arc, curves.offsets, curves.ends, _WIDENS)
+    new = np.ones(len(is_tiny), bool)
+    for attempt in range(_ROUNDS + 2):
+        at, offsets = _places(curves, scale)
+        graph = _graph(chains.graph, curves, ends, _points(curves, room, scale, at), offsets, width, units)
+        bad = _astray(curves, room, at, graph, width) | _in_conflict(curves, ends, at, graph, new, units * width)
+        bad &= scale > 0.0
+        if attempt >= _ROUNDS:
+            bad = per_point(curves, np.logical_or.reduceat(bad, curves.offsets[:-1])) | (attempt > _ROUNDS)
+        if not bad.any():
+            break
+        narrower = np.where(bad, 0.0 if attempt >= _ROUNDS else 0.5, 1.0) * scale
+        narrower[narrower < _NARROWEST] = 0.0
+        narrower = grade_along(narrower, curves.arc, curves.offsets, curves.ends, _WIDENS)
+        new, scale = np.logical_or.reduceat(narrower < scale, curves.offsets[:-1]), narrower
+    return PixelChains(graph, _sides(offsets, curves.ends[:, 0] >= 0))
+
+
+def _graph(
+    graph: BoundaryGraph, curves: Curves, ends: Ends, raw: Floats, offsets: Ints, width: float, units: Floats | float
+) -> BoundaryGraph:
+    """Put samples into a graph, in widths."""
+    # rounded as the points are, so that what lies on the border lies on it exactly
+    cols, rows = snapped(np.array(graph.shape[::-1]) / width, units * width).tolist()
     shape: Any = (rows, cols)
-    order, _ = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
-    while True:
-        raw, offsets = _sample(curves, room, stays, width)
-        ids = numbered(offsets, curves.ends, len(ends.place))
-        points = np.empty((int(ids.max()) + 1, 2))
-        points[ids] = snapped(raw / width, units * width)
-        kind = np.full(len(points), PointKind.FREE, np.uint8)
-        kind[ids[np.repeat(curves.is_frame, np.diff(offsets))]] = PointKind.FRAME
-        kind[: len(ends.place)] = ends.kind
-        graph = replace(
-            chains.graph,
-            points=points,
-            point_kind=kind,
-            chain_offsets=offsets,
-            chain_points=ids,
-            shape=shape,
-        )
-        chain = np.repeat(np.arange(len(stays)), np.diff(offsets) - 1)
-        marks = find_conflicts(points, graph.segments, chain, ~stays, graph.shape, units * width)
-        turned = np.append(enclosed_areas(graph) <= 0.0, False)[graph.chain_regions].any(axis=1)
-        ring, _ = rings(points[ids], offsets, ends.offsets, ends.sockets)
-        turned |= (ring != order).reshape(-1, 2).any(axis=1)
-        bad = np.unique(np.concatenate([chain[marks >= CROSSING], np.flatnonzero(turned)]))
-        if stays[bad].all():
-            return PixelChains(graph, _sides(offsets, curves.ends[:, 0] >= 0))
-        stays[bad] = True
+    ids = numbered(offsets, curves.ends, len(ends.place))
+    points = np.empty((int(ids.max()) + 1, 2))
+    points[ids] = snapped(raw / width, units * width)
+    kind = np.full(len(points), PointKind.FREE, np.uint8)
+    kind[ids[np.repeat(curves.is_frame, np.diff(offsets))]] = PointKind.FRAME
+    kind[: len(ends.place)] = ends.kind
+    return replace(graph, points=points, point_kind=kind, chain_offsets=offsets, chain_points=ids, shape=shape)
 
 
 def _sides(offsets: Ints, is_open: Flags) -> Ints:
@@ -91,58 +111,92 @@ def _sides(offsets: Ints, is_open: Flags) -> Ints:
     return side
 
 
+def _astray(curves: Curves, room: Floats, at: Floats, graph: BoundaryGraph, width: float) -> Flags:
+    """Tell which dense points are farther from where the samples beside them put them than their room."""
+    place = width * graph.points[graph.chain_points]
+    dense = np.arange(len(room))
+    k = np.minimum(np.searchsorted(at, dense, side="right") - 1, per_point(curves, graph.chain_offsets[1:] - 2))
+    arc = np.interp(at, dense, curves.arc)
+    t = (curves.arc - arc[k]) / (arc[k + 1] - arc[k])
+    gone = place[k] + t[:, None] * (place[k + 1] - place[k]) - curves.raw
+    return np.asarray(np.hypot(*gone.T) > room)
+
+
+def _in_conflict(
+    curves: Curves, ends: Ends, at: Floats, graph: BoundaryGraph, new: Flags, units: Floats | float
+) -> Flags:
+    """Tell which dense points lie under samples that cross others, change the order at a node or turn a region."""
+    chain = np.repeat(np.arange(len(new)), np.diff(graph.chain_offsets) - 1)
+    marks = find_conflicts(graph.points, graph.segments, chain, new, graph.shape, units)
+    k = np.flatnonzero(marks >= CROSSING)
+    low, high = at[k + chain[k]].astype(np.int64), np.ceil(at[k + chain[k] + 1]).astype(np.int64)
+    begins = np.zeros(len(curves.raw) + 1, np.int64)
+    np.add.at(begins, low, 1)
+    np.add.at(begins, high + 1, -1)
+    bad = np.cumsum(begins[:-1]) > 0
+    ring, _ = rings(graph.points[graph.chain_points], graph.chain_offsets, ends.offsets, ends.sockets)
+    order, _ = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
+    turned = np.append(enclosed_areas(graph) <= 0.0, False)[graph.chain_regions].any(axis=1)
+    return np.asarray(bad | per_point(curves, turned | (ring != order).reshape(-1, 2).any(axis=1)))
+
+
 @kernel
-def _sample(curves: Curves, room: Floats, stays: Flags, width: float) -> tuple[Floats, Ints]:
-    """Return the points of all chains, those of `stays` as they are."""
-    offsets = np.zeros(len(stays) + 1, np.int64)
-    for c in range(len(stays)):
+def _places(curves: Curves, scale: Floats) -> tuple[Floats, Ints]:
+    """Return places of samples on the dense points, as fractional indices, and the first one of each chain."""
+    cost = np.zeros(len(scale))
+    n_most = 0
+    for c in range(len(curves.ends)):
+        for i in range(curves.offsets[c] + 1, curves.offsets[c + 1]):
+            wide = _EVERY * max(0.5 * (scale[i] + scale[i - 1]), _NARROWEST)
+            cost[i] = cost[i - 1] + (curves.arc[i] - curves.arc[i - 1]) / wide
+        n_most += 2 * (curves.offsets[c + 1] - curves.offsets[c]) + 8
+    at, offsets = np.empty(n_most), np.zeros(len(curves.ends) + 1, np.int64)
+    for c in range(len(curves.ends)):
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
-        n = max(int(curves.arc[last] / (_EVERY * width) + 0.5), 2 if curves.ends[c, 0] >= 0 else 8)
-        offsets[c + 1] = offsets[c] + (last - first if stays[c] else min(n, last - first)) + 1
-    raw = np.empty((offsets[-1], 2))
-    for c in range(len(stays)):
-        first, begin, n = curves.offsets[c], offsets[c], offsets[c + 1] - offsets[c] - 1
-        last = curves.offsets[c + 1] - 1
-        is_open = curves.ends[c, 0] >= 0
-        i = first
-        for k in range(n + 1):
-            if stays[c] or (is_open and (k == 0 or k == n)):
-                i = first + k if stays[c] else (first if k == 0 else last)
-                raw[begin + k, 0], raw[begin + k, 1] = curves.raw[i, 0], curves.raw[i, 1]
+        n, begin = offsets[c], first
+        at[n] = first
+        for i in range(first + 1, last + 1):
+            if i < last and min(scale[i - 1], scale[i], scale[i + 1]) >= _NARROWEST:
                 continue
-            if k == n:  # a closed chain ends where it began
-                raw[begin + k, 0], raw[begin + k, 1] = raw[begin, 0], raw[begin, 1]
-                continue
-            s = curves.arc[last] * k / n
-            while i < last - 1 and curves.arc[i + 1] < s:
-                i += 1
-            t = (s - curves.arc[i]) / max(curves.arc[i + 1] - curves.arc[i], 1e-12)
+            least = 1
+            if begin == first and i == last:  # a chain without pixels
+                least = 2 if curves.ends[c, 0] >= 0 else 8
+            number = min(max(int(cost[i] - cost[begin] + 0.5), least), i - begin)
+            divide(cost, begin, i, number, at, n)
+            n += number
+            begin = i
+        offsets[c + 1] = n + 1
+    return at[: offsets[-1]].copy(), offsets
+
+
+@kernel
+def _points(curves: Curves, room: Floats, scale: Floats, at: Floats) -> Floats:
+    """Return the samples at `at`, averaged where the scale is not that of pixels."""
+    raw = np.empty((len(at), 2))
+    k = 0
+    for c in range(len(curves.ends)):
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        is_open, begin = curves.ends[c, 0] >= 0, k
+        while True:
+            i = min(int(at[k]), last - 1)
+            t = at[k] - i
             x = curves.raw[i, 0] + t * (curves.raw[i + 1, 0] - curves.raw[i, 0])
             y = curves.raw[i, 1] + t * (curves.raw[i + 1, 1] - curves.raw[i, 1])
-            if not curves.is_frame[c]:
-                ax, ay = _mean_at(curves, first, last, i, s, is_open, _BELL * width)
+            wide = scale[i] + t * (scale[i + 1] - scale[i])
+            is_end = is_open and (k == begin or at[k] == last)
+            if not (curves.is_frame[c] or is_end or wide < _NARROWEST):
+                s = curves.arc[i] + t * (curves.arc[i + 1] - curves.arc[i])
+                ax, ay = _mean_at(curves, first, last, i, s, is_open, _BELL * wide)
                 gone = np.hypot(ax - x, ay - y)
                 share = min(1.0, min(room[i], room[i + 1]) / max(gone, 1e-12))
                 x, y = x + share * (ax - x), y + share * (ay - y)
-            raw[begin + k, 0], raw[begin + k, 1] = x, y
-    return raw, offsets
-
-
-@kernel
-def _strays(curves: Curves, room: Floats, raw: Floats, offsets: Ints) -> Flags:
-    """Tell which chains have a point farther from the new chain, at the same share of its length, than its room."""
-    found = np.zeros(len(offsets) - 1, np.bool_)
-    for c in range(len(found)):
-        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
-        begin, n = offsets[c], offsets[c + 1] - offsets[c] - 1
-        found[c] = curves.ends[c, 0] < 0 and last - first < _SHORTEST_LOOP
-        for i in range(first, last + 1):
-            t = n * curves.arc[i] / curves.arc[last]
-            k = min(int(t), n - 1)
-            x = raw[begin + k, 0] + (t - k) * (raw[begin + k + 1, 0] - raw[begin + k, 0])
-            y = raw[begin + k, 1] + (t - k) * (raw[begin + k + 1, 1] - raw[begin + k, 1])
-            found[c] |= np.hypot(x - curves.raw[i, 0], y - curves.raw[i, 1]) > room[i]
-    return found
+            raw[k, 0], raw[k, 1] = x, y
+            k += 1
+            if at[k - 1] == last:
+                break
+        if not is_open:  # it ends where it began
+            raw[k - 1, 0], raw[k - 1, 1] = raw[begin, 0], raw[begin, 1]
+    return raw
 
 
 @verb

@@ -33,6 +33,7 @@ def edge_sizes(
     growth: float,
     edge_ratio: float,
     shape: tuple[float, float],
+    data_point: float = 1.0,
 ) -> Floats:
     """Wanted length of final edges at each dense point.
 
@@ -50,6 +51,8 @@ def edge_sizes(
         Largest ratio of neighbouring elements, and of neighbouring edges of a chain.
     shape : tuple of float
         (n_rows, n_cols) of the picture.
+    data_point : float
+        Its data points' width: thin places may be as thin.
 
     Returns
     -------
@@ -60,7 +63,7 @@ def edge_sizes(
     lfs = local_feature_size(points, curves, reach, _BEND)
     size = np.minimum(limit, _ACROSS * lfs)
     _limit_turn(points, curves.offsets, curves.arc, np.cumsum(is_corner), size)
-    size = np.minimum(np.maximum(size, _FINEST), limit)
+    size = np.minimum(np.maximum(size, _FINEST * data_point), limit)
     return grade(size, points, curves, growth, edge_ratio, shape)
 
 

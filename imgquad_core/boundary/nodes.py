@@ -133,7 +133,7 @@ def place_nodes(
                 continue
             least = -(-at_least[c] // pieces)
             number = 1 if exact[c] else _count(curves, cost, limit, is_corner, begin, i, least, edge_multiple)
-            _divide(cost, begin, i, 2 * number, at, n)
+            divide(cost, begin, i, 2 * number, at, n)
             n += 2 * number
             corner[n] = is_corner[i]
             begin = i
@@ -156,7 +156,7 @@ def _count(
 
 
 @verb
-def _divide(cost: Floats, begin: int, end: int, number: int, at: Floats, n: int) -> None:
+def divide(cost: Floats, begin: int, end: int, number: int, at: Floats, n: int) -> None:
     """Put `number` equal steps of cost between two dense points behind node n."""
     j = begin
     for k in range(1, number):

@@ -65,7 +65,7 @@ def smooth_boundaries(
     true = _TrueShape.of(graph.shape, shape, step)
     pores = pores_of(graph)
     chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step)
-    width = 0.5 * options.tolerance / true.unit
+    width = max(0.5 * options.tolerance / true.unit, 1.0)
     if width > 1.0:
         chains = averaged(chains, width, UNITS * np.array(step))
         true = _TrueShape.of(graph.shape, shape, (step[0] * width, step[1] * width))
@@ -78,9 +78,19 @@ def smooth_boundaries(
         curves, ends, node, smooth = stretch(curves, ends, node, smooth, chains.graph.shape, true.extent)
     limit = per_point(curves, _asked_sizes(chains.graph, curves.is_frame, options) / true.unit)
     draft = Draft(
-        curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.edge_multiple, true.extent, true.grid
+        curves,
+        ends,
+        smooth,
+        node,
+        is_corner,
+        limit,
+        options.edge_ratio,
+        options.edge_multiple,
+        true.extent,
+        true.grid,
+        1.0 / width,
     )
-    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent)
+    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent, 1.0 / width)
     nodes, gently = place_freely(draft, size)
     areas = np.append(graph.region_pixels, pores.pixels) * true.pixel
     sides = pores.sides[which]

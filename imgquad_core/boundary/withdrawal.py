@@ -55,6 +55,7 @@ class Draft(NamedTuple):
     edge_multiple: int  #: very long pieces get a multiple of this many final edges
     shape: tuple[float, float]
     units: float = UNITS  #: steps of the grid on which coordinates are exact, a unit of length
+    data_point: float = 1.0  #: width of the picture's data points
 
 
 def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> tuple[Nodes, bool]:
@@ -92,7 +93,7 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         failed = any_of_chain(factor < 1.0, curves.offsets)
         if attempt >= patience.curved:
             exact |= failed | (attempt >= patience.most)
-        shorter = np.maximum(size * factor, np.minimum(_CLOSEST, draft.limit))
+        shorter = np.maximum(size * factor, np.minimum(_CLOSEST * draft.data_point, draft.limit))
         shorter = grade_chains(shorter, curves, len(draft.node), draft.edge_ratio)
         failed |= any_of_chain(shorter < size, curves.offsets)
         size, withdrawn = shorter, np.where(per_point(curves, exact), 1.0, np.minimum(withdrawn + pull, 1.0))
