@@ -1,4 +1,5 @@
 from .absorbing import Absorbed, Absorption, absorb_thin, areas_of_origin, enlarged_labels
+from .legend import Legend, counts_labels, label_by, legend_of, sample_of, tally_labels
 from .marks import Marks, marks_of
 from .naming import as_told
 from .noise import Removal, automatic_limits, list_removed, remove_noise
@@ -12,6 +13,7 @@ __all__ = [
     "Absorption",
     "Box",
     "DenoiseOptions",
+    "Legend",
     "Marks",
     "Removal",
     "Segmentation",
@@ -21,14 +23,19 @@ __all__ = [
     "as_told",
     "assert_solid",
     "automatic_limits",
+    "counts_labels",
     "crop_image",
     "drop_materials",
     "enlarged_labels",
+    "label_by",
+    "legend_of",
     "list_removed",
     "marks_of",
     "material_number",
     "remove_noise",
+    "sample_of",
     "segment_picture",
     "sizes_by_number",
     "sizes_by_numbers",
+    "tally_labels",
 ]

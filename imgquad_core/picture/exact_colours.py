@@ -15,6 +15,8 @@ from imgquad_core.reading.picture import Picture
 from .codes import codes_of, numbered, values_of_codes
 from .flat_colours import without_blends
 
+#: no limit
+ANY_NUMBER = 1 << 40
 #: grey labels whose levels are nearer than this are shown in colours instead
 VISIBLE = 8
 
@@ -54,7 +56,7 @@ def exact_labels(picture: Picture, most: int, void: Flags | None, with_blends: b
     if found is None:
         return None
     flat = found if with_blends else without_blends(picture, found)
-    labels, materials = _materials(picture, flat.codes)
+    labels, materials = materials_of_codes(picture, flat.codes)
     image = labels[flat.numbers]
     if void is not None:
         image[void] = VOID
@@ -72,7 +74,7 @@ def _whole(values: NDArray[Any]) -> bool:
     return values.dtype.kind in "biu" or bool((values == np.rint(values)).all())
 
 
-def _materials(picture: Picture, codes: NDArray[Any]) -> tuple[Labels, Materials]:
+def materials_of_codes(picture: Picture, codes: NDArray[Any]) -> tuple[Labels, Materials]:
     """Return the label of each distinct code (ascending), and the materials."""
     values = values_of_codes(codes, picture.values)
     if values.ndim == 2:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +14,8 @@ from imgquad_core.jit import kernel
 from imgquad_core.reading.picture import Picture
 
 from .blends import find_rims, relabel_rims
-from .codes import Numbered
-from .levels import levels_of
+from .codes import Numbered, codes_of, values_of_codes
+from .levels import Levels, levels_of
 
 #: least contrast, in levels, of a rim between two flat colours
 RIM = 4.0
@@ -42,26 +44,106 @@ def without_blends(picture: Picture, found: Numbered) -> Numbered:
     if most of their pixels are lonely (at most one equal neighbour) or blends of two sides. A phase one pixel wide is
     solid nowhere, too, but does not outnumber the phases around it.
     """
+    counts = _counts(found)
+    if not _may_be_blends(counts):
+        return found
+    drawn = _drawn(picture)
+    flat = flat_among(_tally(found, counts, drawn), picture)
+    if flat.all():
+        return found
+    labels = np.where(flat, np.cumsum(flat) - 1, -1).astype(np.int32)[found.numbers]
+    _give_away(labels, drawn, _colors(found.codes[flat], picture))
+    return Numbered(found.codes[flat], labels)
+
+
+class Tally(NamedTuple):
+    """How the pixels of each distinct colour lie; what is counted in several pictures adds up."""
+
+    codes: NDArray[Any]  #: (n,) ascending
+    counts: Ints  #: (n, 3) pixels, those with eight equal neighbours, those with one at most
+    at_rims: Ints  #: (n,) pixels that are blends of their two sides
+
+
+def tally_of(picture: Picture, found: Numbered) -> Tally:
+    """Count how the pixels of each distinct colour of a picture lie."""
+    return _tally(found, _counts(found), _drawn(picture))
+
+
+def added_up(tallies: Sequence[Tally]) -> Tally:
+    """Add up what was counted in pictures of one type."""
+    codes, at = np.unique(np.concatenate([tally.codes for tally in tallies]), return_inverse=True)
+    counts, at_rims = np.zeros((len(codes), 3), np.int64), np.zeros(len(codes), np.int64)
+    np.add.at(counts, at, np.concatenate([tally.counts for tally in tallies]))
+    np.add.at(at_rims, at, np.concatenate([tally.at_rims for tally in tallies]))
+    return Tally(codes, counts, at_rims)
+
+
+def flat_among(tally: Tally, like: Picture) -> Flags:
+    """Tell which colours are flat, not blends; all where there are no blends. `like` says what the codes stand for."""
+    nowhere = tally.counts[:, 1] == 0
+    pixels, lonely = tally.counts[nowhere, 0].sum(), tally.counts[nowhere, 2].sum()
+    if not _may_be_blends(tally.counts) or 2 * max(lonely, tally.at_rims[nowhere].sum()) <= pixels:
+        return np.ones(len(nowhere), bool)
+    return _flat(_colors(tally.codes, like), tally.counts[:, 1])
+
+
+def in_flat_colours(picture: Picture, kept: NDArray[Any]) -> Labels:
+    """Return the place of each pixel's code in `kept` (ascending); other codes go to a colour beside them."""
+    codes = codes_of(picture.values)
+    place = np.minimum(np.searchsorted(kept, codes), len(kept) - 1)
+    labels = np.where(kept[place] == codes, place, -1).astype(np.int32)
+    if (labels < 0).any():
+        _give_away(labels, _drawn(picture), _colors(kept, picture))
+    return labels
+
+
+class _Drawn(NamedTuple):
+    plane: Bytes
+    rims: Flags
+
+
+def _drawn(picture: Picture) -> _Drawn:
+    levels = levels_of(picture, None)
+    return _Drawn(plane := _plane(levels), find_rims(plane, RIM))
+
+
+def _plane(levels: Levels) -> Bytes:
+    return np.clip(np.rint(levels.rows(0, levels.shape[0])), 0.0, 255.0).astype(np.uint8)
+
+
+def _colors(codes: NDArray[Any], picture: Picture) -> Floats:
+    """Return the levels that codes have in a picture, shape (n, n_channels)."""
+    levels = levels_of(picture, None)
+    values = values_of_codes(codes, picture.values)
+    values = values if picture.palette is None else picture.palette[values]
+    if values.ndim == 2 and picture.palette is None and picture.values.dtype == np.uint16:
+        values = values >> 8  # as `levels_of` takes deep colours
+    channels = levels.values.shape[2]
+    values = values.reshape(len(codes), 1, -1)[..., :channels]
+    return _plane(replace(levels, values=values, void=None))[:, 0].astype(float)
+
+
+def _give_away(labels: Labels, drawn: _Drawn, colors: Floats) -> None:
+    """Give pixels of label -1 to one of the labels beside them, in place."""
+    blended = labels < 0
+    _grow(drawn.plane, labels, np.flatnonzero(blended), colors)
+    relabel_rims(drawn.plane, drawn.rims & blended, labels, colors)
+
+
+def _counts(found: Numbered) -> Ints:
     counts = np.zeros((len(found.codes), 3), np.int64)
     count_by_number(found.numbers, counts)
+    return counts
+
+
+def _tally(found: Numbered, counts: Ints, drawn: _Drawn) -> Tally:
+    at_rims = np.bincount(found.numbers[drawn.rims], minlength=len(counts))
+    return Tally(found.codes, counts, at_rims.astype(np.int64))
+
+
+def _may_be_blends(counts: Ints) -> bool:
     nowhere = counts[:, 1] == 0
-    if not np.count_nonzero(nowhere) > np.count_nonzero(~nowhere) > 0:
-        return found
-    levels = levels_of(picture, None)
-    plane = np.clip(np.rint(levels.rows(0, levels.shape[0])), 0.0, 255.0).astype(np.uint8)
-    rims = find_rims(plane, RIM)
-    pixels, lonely = counts[nowhere, 0].sum(), counts[nowhere, 2].sum()
-    at_rims = np.bincount(found.numbers[rims], minlength=len(nowhere))[nowhere].sum()
-    if 2 * max(lonely, at_rims) <= pixels:
-        return found
-    colors = plane.reshape(-1, plane.shape[2])[np.unique(found.numbers, return_index=True)[1]].astype(float)
-    flat = _flat(colors, counts[:, 1])
-    number = np.where(flat, np.cumsum(flat) - 1, -1).astype(np.int32)
-    labels = number[found.numbers]
-    blended = np.flatnonzero(labels < 0)
-    _grow(plane, labels, blended, colors[flat])
-    relabel_rims(plane, rims & ~flat[found.numbers], labels, colors[flat])
-    return Numbered(found.codes[flat], labels)
+    return bool(np.count_nonzero(nowhere) > np.count_nonzero(~nowhere) > 0)
 
 
 def _flat(colors: Floats, solid: Ints) -> Flags:

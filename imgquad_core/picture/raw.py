@@ -29,6 +29,8 @@ FOOT = 1.0
 SHADED, BETTER = 2.0, 1.25
 #: constants count if at least so much of the picture is flat beside them
 LEFT = 0.05
+#: levels by which a constant may differ from picture to picture
+SAME = 1.0
 #: a pixel so far from another class towards its own keeps it, whatever is around it
 CLEAR = 0.7
 
@@ -65,8 +67,10 @@ class Found:
         Root of the mean squared distance of the pixels' colours from their classes: levels, CIELAB units of colours.
     smooth : Smooth
         The picture without noise.
-    constants, tails : int
-        How many classes are constant values, and rare phases outside all others.
+    constant : bool, shape (n_classes,)
+        Which classes are constant values.
+    tails : int
+        How many classes are rare phases outside all others.
     """
 
     labels: Labels
@@ -76,10 +80,15 @@ class Found:
     noise: float
     rims: int
     smooth: Smooth
+    constant: Flags
     separation: float = np.inf
     left_over: float = 0.0
-    constants: int = 0
     tails: int = 0
+
+    @property
+    def constants(self) -> int:
+        """How many classes are constant values."""
+        return int(np.count_nonzero(self.constant))
 
     @property
     def shaded(self) -> bool:
@@ -150,6 +159,45 @@ def find_nearest(levels: Levels, palette: Floats) -> Found:
     return _labelled(Choice(levels, smooth, classes), palette, [], noise, 0)
 
 
+class Known(NamedTuple):
+    """Classes that were found in other pictures of the same thing."""
+
+    means: Floats  #: (n_classes, 1 or 3), from dark to light
+    constant: Flags  #: (n_classes,) which of them are constant values
+    noise: float
+
+
+def known_classes(found: Found) -> Known:
+    """Return the classes of a picture, for others of the same thing."""
+    return Known(found.means, found.constant, found.noise)
+
+
+def find_known(levels: Levels, known: Known) -> Labels:
+    """Give each pixel its class of those that are known.
+
+    Raises
+    ------
+    ValueError
+        The picture has colours, the classes are grey.
+    """
+    smooth = smoothed(levels, known.noise, None)
+    in_color = known.means.shape[1] == 3
+    if levels.is_grey and in_color:
+        smooth = smooth._replace(plane=np.repeat(smooth.plane, 3, axis=2))
+    elif in_color != (not levels.is_grey):
+        raise ValueError("colours among greys")
+    shades, levels_of_constants = np.flatnonzero(~known.constant), np.flatnonzero(known.constant)
+    constants, order = [], list(shades)
+    for constant in constants_of(levels, known.noise) if len(levels_of_constants) else []:
+        nearest = levels_of_constants[np.abs(known.means[levels_of_constants, 0] - constant.level).argmin()]
+        if abs(known.means[nearest, 0] - constant.level) <= SAME and nearest not in order:
+            constants.append(constant)
+            order.append(nearest)
+    classes = Classes(known.means[shades], np.zeros(0, np.int32), np.inf, 0.0, "")
+    labels = _numbered(Choice(levels, smooth, classes), known.means[shades], constants, known.noise)
+    return np.asarray(np.array(order, np.int32)[labels], np.int32)
+
+
 def smoothed(levels: Levels, noise: float, without: Flags | None) -> Smooth:
     """Take noise away and tell rims and slopes from what is flat; pixels `without` and void are no support."""
     plane = np.empty((*levels.shape, levels.values.shape[2]), np.uint8)
@@ -198,7 +246,32 @@ def _by_light(means: Floats) -> Ints:
 
 
 def _labelled(choice: Choice, means: Floats, constants: list[Constant], noise: float, tails: int) -> Found:
-    """Give each pixel its nearest class, rims one of their sides, and noise what is around it."""
+    """Give each pixel its class, and the classes their order."""
+    labels = _numbered(choice, means, constants, noise)
+    means = np.concatenate([means, *([[c.level]] for c in constants)])
+    is_constant = np.arange(len(means)) >= len(means) - len(constants)
+    if constants:
+        order = _by_light(means)
+        place = np.empty(len(order), np.int32)
+        place[order] = np.arange(len(order))
+        labels, means, is_constant = place[labels], means[order], is_constant[order]
+    return Found(
+        labels=labels,
+        means=means,
+        levels=choice.levels,
+        method=choice.classes.method,
+        noise=noise,
+        rims=int(np.count_nonzero(choice.smooth.rims)),
+        smooth=choice.smooth,
+        constant=is_constant,
+        separation=choice.classes.separation,
+        left_over=choice.classes.left_over,
+        tails=tails,
+    )
+
+
+def _numbered(choice: Choice, means: Floats, constants: list[Constant], noise: float) -> Labels:
+    """Give each pixel its nearest class, rims one of their sides, noise what is around it; constants come last."""
     smooth = choice.smooth
     histogram = histogram_of(smooth.plane, smooth.support)
     in_color = means.shape[1] == 3
@@ -211,26 +284,7 @@ def _labelled(choice: Choice, means: Floats, constants: list[Constant], noise: f
         relabel_rims(smooth.plane, smooth.rims, labels, means)
         for k, constant in enumerate(constants):
             labels[constant.pixels] = len(means) - len(constants) + k
-    if noise >= NOISY:
-        labels = commonest_around(labels, smooth.plane, means)
-    if constants:
-        order = _by_light(means)
-        place = np.empty(len(order), np.int32)
-        place[order] = np.arange(len(order))
-        labels, means = place[labels], means[order]
-    return Found(
-        labels=labels,
-        means=means,
-        levels=choice.levels,
-        method=choice.classes.method,
-        noise=noise,
-        rims=int(np.count_nonzero(smooth.rims)),
-        smooth=smooth,
-        separation=choice.classes.separation,
-        left_over=choice.classes.left_over,
-        constants=len(constants),
-        tails=tails,
-    )
+    return commonest_around(labels, smooth.plane, means) if noise >= NOISY else labels
 
 
 @kernel

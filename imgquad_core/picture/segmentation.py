@@ -14,7 +14,7 @@ from imgquad_core.model import VOID, LabelImage, Materials
 from imgquad_core.reading.picture import Picture, picture_of
 
 from .classes import APART
-from .exact_colours import exact_labels, with_minus_one
+from .exact_colours import ANY_NUMBER, exact_labels, with_minus_one
 from .grain_maps import LEFT_OVER, SHARE, cores_of, regions_of
 from .kinds import Kind, kind_of
 from .levels import NOISY, levels_of
@@ -23,8 +23,6 @@ from .options import SegmentationOptions
 from .raw import Found, find_classes, find_nearest
 from .voids import fill_void, void_clusters
 
-#: no limit
-ANY_NUMBER = 1 << 40
 #: void clusters of at most so many pixels are told, for they may be faults of the measurement
 SPECKS = 16
 
@@ -120,8 +118,8 @@ def segment_picture(
     if isinstance(picture, LabelImage):
         return Segmentation(picture, quantised=False)
     picture = picture if isinstance(picture, Picture) else picture_of(picture)
-    void = _void_of(picture, options)
-    return _void_told(_found(picture, options, void), options)
+    void = void_of(picture, options)
+    return void_told(_found(picture, options, void), options)
 
 
 def _found(picture: Picture, options: SegmentationOptions, void: Flags | None) -> Segmentation:
@@ -143,7 +141,7 @@ def _found(picture: Picture, options: SegmentationOptions, void: Flags | None) -
     return _nearest(picture, np.rint(np.array(colors, float)), void)
 
 
-def _void_of(picture: Picture, options: SegmentationOptions) -> Flags | None:
+def void_of(picture: Picture, options: SegmentationOptions) -> Flags | None:
     """Return the pixels that hold nothing or are transparent, None where there are none."""
     if not options.drop_transparent or picture.opaque is None:
         return picture.void
@@ -170,10 +168,11 @@ def _kept(picture: Picture, kind: Kind, void: Flags | None) -> Segmentation:
     details = f": {kind.reason}"
     if found.blends:
         details += f"; {found.blends} blended colours of rims went to their sides"
-    return Segmentation(found.image, found.blends > 0, details=details, warnings=_doubts(kind))
+    return Segmentation(found.image, found.blends > 0, details=details, warnings=doubts_of(kind))
 
 
-def _doubts(kind: Kind) -> tuple[str, ...]:
+def doubts_of(kind: Kind) -> tuple[str, ...]:
+    """Say what else a picture may be."""
     if kind.doubt is None:
         return ()
     taken, other, option = (
@@ -190,7 +189,7 @@ def _divided(
     """Divide a raw picture in classes: so many as are far apart, or the number asked for (`kind` is None)."""
     number = None if kind is not None else int(options.colors)  # type: ignore[arg-type]
     found = find_classes(levels_of(picture, void), number, options.flatten == "auto")
-    warnings = () if kind is None else _doubts(kind) + _overlap(found) + _grains(found)
+    warnings = () if kind is None else doubts_of(kind) + overlap_of(found) + _grains(found)
     return _told(found, void, warnings)
 
 
@@ -203,8 +202,8 @@ def _told(found: Found, void: Flags | None, warnings: tuple[str, ...]) -> Segmen
     labels = found.labels
     if void is not None:
         labels[void] = VOID
-    image = LabelImage(labels, _materials(found))
-    return Segmentation(image, True, found.method, found.noise, found.rims, _details(found), warnings)
+    image = LabelImage(labels, materials_of_classes(found))
+    return Segmentation(image, True, found.method, found.noise, found.rims, details_of(found), warnings)
 
 
 def _grains(found: Found) -> tuple[str, ...]:
@@ -217,14 +216,15 @@ def _grains(found: Found) -> tuple[str, ...]:
     return (f"it may be a map of {len(cores.means)} grains: colors = regions makes each a material",)
 
 
-def _overlap(found: Found) -> tuple[str, ...]:
+def overlap_of(found: Found) -> tuple[str, ...]:
+    """Say if classes are not far apart."""
     if found.separation >= APART:
         return ()
     what = "the classes overlap" if len(found.means) - found.constants - found.tails > 1 else "no classes stand out"
     return (f"{what} ({found.separation:.1f} of {APART:.0f}): give their number (colors = N) or marks",)
 
 
-def _details(found: Found) -> str:
+def details_of(found: Found) -> str:
     """Say how classes were found."""
     parts = []
     if np.isfinite(found.separation):
@@ -240,7 +240,7 @@ def _details(found: Found) -> str:
     return "".join(f", {part}" for part in parts) + f", {found.rims} blended pixels"
 
 
-def _void_told(found: Segmentation, options: SegmentationOptions) -> Segmentation:
+def void_told(found: Segmentation, options: SegmentationOptions) -> Segmentation:
     """Fill small void clusters, and say what is void."""
     n_void = int(np.count_nonzero(found.image.labels == VOID))
     if n_void == 0:
@@ -256,7 +256,7 @@ def _void_told(found: Segmentation, options: SegmentationOptions) -> Segmentatio
     return replace(found, image=image, details=found.details + details, warnings=found.warnings + warnings)
 
 
-def _materials(found: Found) -> Materials:
+def materials_of_classes(found: Found) -> Materials:
     """Name materials 0, 1, ... by their colour; a name that has been given gets the number behind it."""
     means, levels = found.means, found.levels
     colors = np.clip(np.rint(means if means.shape[1] == 3 else np.repeat(means, 3, axis=1)), 0, 255).astype(np.uint8)

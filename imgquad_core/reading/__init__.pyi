@@ -1,5 +1,5 @@
 from .calibration import Calibration, PixelSize, asked_placement, assert_placement, size_note
-from .formats import FORMATS, read_picture
+from .formats import FORMATS, count_pictures, read_picture
 from .options import ReadOptions
 from .picture import Crystal, Picture, picture_of
 
@@ -12,6 +12,7 @@ __all__ = [
     "ReadOptions",
     "asked_placement",
     "assert_placement",
+    "count_pictures",
     "picture_of",
     "read_picture",
     "size_note",

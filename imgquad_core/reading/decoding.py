@@ -65,6 +65,17 @@ def assert_pixels(path: Path | str, width: int, height: int, options: ReadOption
         )
 
 
+class NoSuchPicture(InputError):
+    """A number of a picture that a file does not hold; `n` is how many it holds."""
+
+    def __init__(self, message: str, n: int) -> None:
+        super().__init__(message)
+        self.n = n
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.n)
+
+
 class Stack(NamedTuple):
     """The axes of a file that holds several pictures, slowest first: their names and lengths.
 
@@ -119,7 +130,7 @@ class Stack(NamedTuple):
             )
         place = asked or 0
         if place >= n:
-            raise InputError(f"{what} is {place}, but {self.name} holds {n}: give 0 to {n - 1}")
+            raise NoSuchPicture(f"{what} is {place}, but {self.name} holds {n}: give 0 to {n - 1}", n)
         return place
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from imgquad_core.errors import InputError
 
+from .decoding import NoSuchPicture
 from .ebsd_maps import read_ang, read_ctf
 from .hdf5_files import read_hdf5
 from .info_bar import cut_info_bar
@@ -19,7 +21,7 @@ from .tiff import MAGIC, read_tiff
 from .volumes import read_mrc, read_nifti, read_nrrd
 from .zarr_images import is_zarr, read_zarr
 
-__all__ = ["FORMATS", "Format", "Picture", "ReadOptions", "format_of", "picture_of", "read_picture"]
+__all__ = ["FORMATS", "Format", "Picture", "ReadOptions", "count_pictures", "format_of", "picture_of", "read_picture"]
 
 Reader = Callable[[Path, ReadOptions], Picture]
 
@@ -112,6 +114,29 @@ def read_picture(path: str | Path, options: ReadOptions | None = None) -> Pictur
     path, options = Path(path), options or ReadOptions()
     found = format_of(path).read(path, options)
     return cut_info_bar(found, options.info_bar)
+
+
+def count_pictures(path: str | Path, options: ReadOptions | None = None) -> int:
+    """Return how many pictures a file holds that `ReadOptions.frame` can choose from.
+
+    Parameters
+    ----------
+    path, options
+        As for `read_picture`; `frame` does not count.
+
+    Raises
+    ------
+    InputError
+        As for `read_picture`, but for what is wrong with the pixels.
+    """
+    try:
+        read_picture(path, replace(options or ReadOptions(), frame=_BEYOND))
+    except NoSuchPicture as error:
+        return error.n
+    return 1
+
+
+_BEYOND = 1 << 40  #: more pictures than a file holds
 
 
 def format_of(path: Path) -> Format:
