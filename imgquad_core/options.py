@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, Literal
@@ -13,7 +13,7 @@ from .declared import check, option, same_as
 from .errors import InputError
 from .frozen import FrozenMapping
 from .mesher import EFFORTS, MeshingOptions
-from .picture import AbsorbOptions, DenoiseOptions, SegmentationOptions
+from .picture import AbsorbOptions, DenoiseOptions, EditOptions, SegmentationOptions
 from .reading import Calibration, ReadOptions, asked_placement, assert_placement
 
 if TYPE_CHECKING:
@@ -49,6 +49,12 @@ class MeshOptions:
         Whether what looks like the marks is a mark, too.
     fill_void : int
         Void clusters of at most so many pixels go to the material around.
+    merge : mapping of (str or int, ...) to str
+        Materials that become one, and its name; see `merge_materials`.
+    rename : mapping of (str or int) to str
+        Other names of materials; all later options call them by these.
+    recolor : mapping of (str or int) to RGB
+        Other colours of materials.
     min_pixels : "auto" or int
         Clusters of fewer pixels are noise if they are also shorter than `min_length`.
     min_length : "auto" or float
@@ -120,6 +126,9 @@ class MeshOptions:
     marks: Any = same_as(SegmentationOptions, "marks")
     learn: bool = same_as(SegmentationOptions, "learn")
     fill_void: int = same_as(SegmentationOptions, "fill_void")
+    merge: Mapping[tuple[str | int, ...], str] = same_as(EditOptions, "merge")
+    rename: Mapping[str | int, str] = same_as(EditOptions, "rename")
+    recolor: Mapping[str | int, Sequence[int]] = same_as(EditOptions, "recolor")
     min_pixels: int | Literal["auto"] = same_as(
         DenoiseOptions,
         "min_pixels",
@@ -188,9 +197,13 @@ class MeshOptions:
         assert_placement(self.pixel_size, self.origin)
         if self.crop is not None and not _is_box(self.crop):
             raise InputError(f"crop is {self.crop!r}; give left, upper, right and lower bound in whole pixels")
+        edits = self.editing()
         for name, made in (
             ("material_sizes", FrozenMapping(self.material_sizes or {})),
             ("sizes_between", FrozenMapping(self.sizes_between or {})),
+            ("merge", edits.merge),
+            ("rename", edits.rename),
+            ("recolor", edits.recolor),
             ("drop", _materials("drop", self.drop)),
             ("keep", _materials("keep", self.keep)),
             ("colors", _hashable(self.colors)),
@@ -259,6 +272,10 @@ class MeshOptions:
             fill_void=self.fill_void,
             drop_transparent=self.drop_transparent,
         )
+
+    def editing(self) -> EditOptions:
+        """Return what the user makes of the materials."""
+        return EditOptions(self.merge, self.rename, self.recolor)
 
     def noise(self, quantised: bool, shape: tuple[int, int]) -> DenoiseOptions:
         """Return the limits of noise in a picture of `shape`."""

@@ -46,6 +46,7 @@ from .picture import (
     assert_solid,
     crop_image,
     drop_materials,
+    edit_materials,
     enlarged_labels,
     list_removed,
     remove_noise,
@@ -79,7 +80,7 @@ class Run:
     segmentation : Segmentation
         The picture as segmented, and what was chosen.
     picture : LabelImage
-        The part that was asked for, before noise removal.
+        The part that was asked for, with the materials that were asked for, before noise removal.
     step : tuple of float
         Width and height of data points, in pixels.
     noise : DenoiseOptions
@@ -183,7 +184,8 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
     raw = source if isinstance(source, Segmentation) else _read(source, options, timed)
     found = raw if isinstance(raw, Segmentation) else _segmented(raw, options, timed)
     crop = None if isinstance(raw, Picture) and raw.window else options.crop  # what was read may be the part already
-    picture = crop_image(found.image, crop) if crop else found.image
+    edited = edit_materials(found.image, options.editing())
+    picture = crop_image(edited, crop) if crop else edited
     calibration, notes = _what_the_file_says(raw, crop, options)
     options = options.placed(calibration, raw.name if isinstance(raw, Picture) else "the picture")
     with timed("denoise"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import sqrt
 from numbers import Integral
@@ -10,6 +10,7 @@ from typing import Any
 
 from imgquad_core.declared import POLICY, Declaration, check, option
 from imgquad_core.errors import InputError
+from imgquad_core.frozen import FrozenMapping
 
 _NUMBER = Declaration(0, "", int, least=1, most=256)  # of colours
 
@@ -99,6 +100,68 @@ def _is_palette(colors: Any) -> bool:
     except (TypeError, ValueError):
         return False
     return bool(rows) and all(len(row) == 3 and all(0 <= level <= 255 for level in row) for row in rows)
+
+
+@dataclass(frozen=True)
+class EditOptions:
+    """What the user makes of the materials that were found: merged first, then renamed, then given other colours.
+
+    Parameters
+    ----------
+    merge : mapping of (str or int, ...) to str
+        Names or numbers of materials that become one, and its name.
+    rename : mapping of (str or int) to str
+        New names.
+    recolor : mapping of (str or int) to RGB
+        New colours, 0 to 255.
+    """
+
+    merge: Mapping[tuple[str | int, ...], str] = option(
+        FrozenMapping(), "materials that become one, by names or numbers, and its name", topic="picture"
+    )
+    rename: Mapping[str | int, str] = option(
+        FrozenMapping(), "another name of a material, given by name or number, after merging", topic="picture"
+    )
+    recolor: Mapping[str | int, Sequence[int]] = option(
+        FrozenMapping(), "another colour of a material, given by name or number, after renaming", topic="picture"
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        for name, is_right, wanted in _EDITS:
+            given = getattr(self, name)
+            if not isinstance(given, Mapping) or not all(map(is_right, given.items())):
+                raise InputError(f"{name} is {given!r}; give {wanted}")
+            made = {key: tuple(map(int, value)) if name == "recolor" else value for key, value in given.items()}
+            object.__setattr__(self, name, FrozenMapping(made))
+
+
+def _is_material(given: Any) -> bool:
+    return isinstance(given, (str, Integral)) and not isinstance(given, bool)
+
+
+def _is_name(given: Any) -> bool:
+    """Tell whether a name can be said on a command line and in a script, too."""
+    return isinstance(given, str) and given.isprintable() and given == given.strip() != "" and "=" not in given
+
+
+def _is_merge(item: tuple[Any, Any]) -> bool:
+    return isinstance(item[0], tuple) and all(map(_is_material, item[0])) and _is_name(item[1])
+
+
+def _is_rename(item: tuple[Any, Any]) -> bool:
+    return _is_material(item[0]) and _is_name(item[1])
+
+
+def _is_recolor(item: tuple[Any, Any]) -> bool:
+    return _is_material(item[0]) and not isinstance(item[1], str) and _is_palette([item[1]])
+
+
+_EDITS = (
+    ("merge", _is_merge, "a mapping of tuples of materials to a name, as {('quartz', 'mica'): 'hard'}"),
+    ("rename", _is_rename, "a mapping of materials to names, as {'grey_87': 'quartz'}"),
+    ("recolor", _is_recolor, "a mapping of materials to R, G, B from 0 to 255, as {'quartz': (255, 128, 0)}"),
+)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -81,7 +82,7 @@ CONVERTED_BY: Mapping[str, str] = {
 }
 
 
-def read_picture(path: str | Path, options: ReadOptions | None = None) -> Picture:
+def read_picture(path: str | Path, options: ReadOptions | None = None, name: str | None = None) -> Picture:
     """Read a picture from a file.
 
     Parameters
@@ -91,6 +92,8 @@ def read_picture(path: str | Path, options: ReadOptions | None = None) -> Pictur
         their names. VTK's (.vti, .mha) are for `imgquad_mesh.read`.
     options : ReadOptions, optional
         Pixel limit; which frame, channel, level or array; what becomes of an info bar.
+    name : str, optional
+        What to call the picture in messages, of a file whose path says nothing to the user; the path by default.
 
     Returns
     -------
@@ -112,8 +115,18 @@ def read_picture(path: str | Path, options: ReadOptions | None = None) -> Pictur
     volumes and arrays the first stored row is on top, as NumPy prints them.
     """
     path, options = Path(path), options or ReadOptions()
-    found = format_of(path).read(path, options)
-    return cut_info_bar(found, options.info_bar)
+    with called(path, name):
+        found = cut_info_bar(format_of(path).read(path, options), options.info_bar)
+    return replace(found, name=name) if name else found
+
+
+@contextmanager
+def called(path: Path, name: str | None) -> Iterator[None]:
+    """Call the picture by its `name` in what is raised about the file at `path`."""
+    try:
+        yield
+    except InputError as error:
+        raise (InputError(str(error).replace(str(path), name)) if name else error) from error.__cause__
 
 
 def count_pictures(path: str | Path, options: ReadOptions | None = None) -> int:

@@ -17,10 +17,12 @@ from .decoding import Stack, assert_pixels, decoding
 from .options import ReadOptions
 from .picture import Picture, picture_of
 
+#: unpickling runs what its author wrote, so the way round it is for those who trust the file, and not told here
 _OBJECTS = (
-    "holds Python objects: save the array in it by itself, for Cellpose's _seg.npy by"
-    " numpy.save('masks.npy', numpy.load(FILE, allow_pickle=True).item()['masks'])"
+    "holds Python objects (pickles), which are never loaded: where the file was made, save the bare array in it by "
+    "numpy.save (of Cellpose, what is under 'masks')"
 )
+_PICKLE = b"\x80"  #: how a pickle starts, whatever the file is called
 
 
 def read_npy(path: Path, options: ReadOptions) -> Picture:
@@ -70,6 +72,9 @@ def plane_of(path: Path, array: NDArray[Any], options: ReadOptions) -> Picture:
 
 def _assert_no_objects(path: Path, file: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Return shape and type of what a file holds, read from its header; raise for Python objects."""
+    if file.read(1) == _PICKLE:
+        raise InputError(f"{path} {_OBJECTS}")
+    file.seek(0)
     version = npy.read_magic(file)  # type: ignore[no-untyped-call]
     read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, _, dtype = read(file)  # type: ignore[no-untyped-call]

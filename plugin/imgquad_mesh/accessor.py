@@ -47,6 +47,9 @@ class ImageAccessor(_Accessor[pv.ImageData]):
 
     segment = _method(filters.segment)
     remove_noise = _method(filters.remove_noise)
+    merge_materials = _method(filters.merge_materials)
+    rename_materials = _method(filters.rename_materials)
+    recolor_materials = _method(filters.recolor_materials)
     drop_materials = _method(filters.drop_materials)
     boundaries = _method(filters.boundaries)
     mesh = _method(filters.mesh)

@@ -63,6 +63,26 @@ def _write_sizes_between(sizes: Mapping[Any, float] | None) -> str:
     return _joined(f"{_joined(map(str, pair))}={size!r}" for pair, size in (sizes or {}).items())
 
 
+def _merges(text: str) -> dict[tuple[str, ...], str]:
+    return dict(merge(item) for item in _items(text))
+
+
+def _write_merges(merges: Mapping[Any, str]) -> str:
+    return _joined(f"{_joined(map(str, names))}={name}" for names, name in merges.items())
+
+
+def _renames(text: str) -> dict[str, str]:
+    return dict(rename(item) for item in _items(text))
+
+
+def _recolors(text: str) -> dict[str, tuple[int, int, int]]:
+    return dict(recolor(item) for item in _items(text))
+
+
+def _write_recolors(colors: Mapping[Any, Any]) -> str:
+    return _joined(f"{name}={_write_colors([color])}" for name, color in colors.items())
+
+
 def _cohesive(text: str) -> str | tuple[tuple[str, str], ...] | None:
     return _gathered_pairs([pair(item) for item in _items(text)])
 
@@ -107,9 +127,42 @@ def colors(text: str) -> str | int | list[tuple[int, int, int]]:
     if text.isdigit():
         return int(text)
     parts = [part.strip() for part in text.split(",")]
-    if not all(re.fullmatch("#[0-9a-fA-F]{6}", part) for part in parts):
+    if not all(map(_is_color, parts)):
         raise argparse.ArgumentTypeError(f"'{text}' is none of: auto, exact, regions, a number, '#rrggbb,#rrggbb,...'")
-    return [(int(p[1:3], 16), int(p[3:5], 16), int(p[5:7], 16)) for p in parts]
+    return [_rgb(part) for part in parts]
+
+
+def _is_color(text: str) -> bool:
+    return bool(re.fullmatch("#[0-9a-fA-F]{6}", text))
+
+
+def _rgb(text: str) -> tuple[int, int, int]:
+    return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
+
+
+def merge(text: str) -> tuple[tuple[str, ...], str]:
+    """Return what --merge asks for."""
+    materials, _, name = text.rpartition("=")
+    merged = _items(materials)
+    if len(merged) < 2 or not name:
+        raise argparse.ArgumentTypeError(f"'{text}' is not A,B=NAME, as in quartz,feldspar=hard")
+    return tuple(merged), name
+
+
+def rename(text: str) -> tuple[str, str]:
+    """Return what --rename asks for."""
+    material, _, name = text.rpartition("=")
+    if not material or not name:
+        raise argparse.ArgumentTypeError(f"'{text}' is not MATERIAL=NAME, as in grey_87=quartz")
+    return material, name
+
+
+def recolor(text: str) -> tuple[str, tuple[int, int, int]]:
+    """Return what --recolor asks for."""
+    material, _, color = text.rpartition("=")
+    if not material or not _is_color(color):
+        raise argparse.ArgumentTypeError(f"'{text}' is not MATERIAL=#rrggbb, as in 'quartz=#ff8000'")
+    return material, _rgb(color)
 
 
 def box(text: str) -> tuple[int, int, int, int]:
@@ -192,6 +245,33 @@ TEXTS: Mapping[str, Text] = {
         colors, _write_colors, "auto|exact|regions|N|#rrggbb,#rrggbb", "A palette is written '#rrggbb,#rrggbb'."
     ),
     "marks": Text(_none_or(str, ""), _write_or(str, ""), "FILE", "Empty: none."),
+    "merge": Text(
+        _merges,
+        _write_merges,
+        "A,B=NAME",
+        'Each in double quotes: "quartz,feldspar=hard","1,7=soft".',
+        "merge",
+        merge,
+        dict,
+    ),
+    "rename": Text(
+        _renames,
+        lambda names: _joined(f"{each}={name}" for each, name in names.items()),
+        "MATERIAL=NAME",
+        f"Written grey_87=quartz,7=mica; {_QUOTED} with its new name.",
+        "rename",
+        rename,
+        dict,
+    ),
+    "recolor": Text(
+        _recolors,
+        _write_recolors,
+        "MATERIAL=#rrggbb",
+        f"Written quartz=#ff8000,7=#0000ff; {_QUOTED} with its colour.",
+        "recolor",
+        recolor,
+        dict,
+    ),
     "min_pixels": Text(whole_or_auto, str, "auto|N"),
     "min_length": Text(real_or_auto, lambda v: v if isinstance(v, str) else repr(v), "auto|LENGTH"),
     "boundary_size": Text(_none_or(number, "auto"), _write_or(repr, "auto"), "LENGTH", "auto: as inside."),

@@ -232,12 +232,18 @@ def test_texts_are_read_and_written_back() -> None:
         "min_length": "7.25",
         "boundary_size": "1.3",
         "material_sizes": 'quartz=2.5,"a, b=1"',
+        "merge": '"quartz,feldspar=hard","""a, b"",1=soft"',
+        "rename": '7=mica,"8=a, b"',
+        "recolor": "mica=#ff8000",
         "drop": 'pore,"a, b"',
         "crop": "1,2,30,40",
     }
     made = options_from(options, spec, values)
     assert made.colors == ((255, 0, 0), (0, 255, 10))
     assert (made.min_pixels, made.min_length, made.boundary_size) == (12, 7.25, 1.3)
+    assert made.merge == {("quartz", "feldspar"): "hard", ("a, b", "1"): "soft"}
+    assert made.rename == {"7": "mica", "8": "a, b"}
+    assert made.recolor == {"mica": (255, 128, 0)}
     assert made.material_sizes == {"quartz": 2.5, "a, b": 1.0}
     assert (made.drop, made.crop) == (("pore", "a, b"), (1, 2, 30, 40))
     again = options_from(options, spec, values_of(made, spec))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.picture.naming import as_told
 from imgquad_core.picture.segmentation import segment_picture
-from imgquad_core.reading.formats import read_picture
+from imgquad_core.reading.formats import called, read_picture
 from imgquad_core.reading.options import ReadOptions
 from imgquad_core.reading.picture import Picture
 
@@ -21,10 +22,14 @@ from .images import MATERIAL, OPAQUE, PALETTE, PICTURE, VOID_PIXELS
 from .vtk_files import EXTENSIONS, read_vtk
 
 
-def read_any(path: str | Path, options: ReadOptions | None = None) -> Picture:
+def read_any(path: str | Path, options: ReadOptions | None = None, name: str | None = None) -> Picture:
     """Read a picture from a file of any format that the command reads; see `imgquad_core.reading.read_picture`."""
     path, options = Path(path), options or ReadOptions()
-    return read_vtk(path, options) if path.suffix.lower() in EXTENSIONS else read_picture(path, options)
+    if path.suffix.lower() not in EXTENSIONS:
+        return read_picture(path, options, name)
+    with called(path, name):
+        found = read_vtk(path, options)
+    return replace(found, name=name) if name else found
 
 
 def read(path: str | Path, **options: Any) -> pv.ImageData:

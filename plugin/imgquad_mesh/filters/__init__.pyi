@@ -1,18 +1,30 @@
 from .grids import boundaries_of_mesh, optimize, plot, quadratic, quality, report
-from .images import boundaries, drop_materials, mesh, remove_noise, segment
+from .images import (
+    boundaries,
+    drop_materials,
+    merge_materials,
+    mesh,
+    recolor_materials,
+    remove_noise,
+    rename_materials,
+    segment,
+)
 from .lines import quads, smooth
 
 __all__ = [
     "boundaries",
     "boundaries_of_mesh",
     "drop_materials",
+    "merge_materials",
     "mesh",
     "optimize",
     "plot",
     "quadratic",
     "quads",
     "quality",
+    "recolor_materials",
     "remove_noise",
+    "rename_materials",
     "report",
     "segment",
     "smooth",

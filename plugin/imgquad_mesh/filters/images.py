@@ -29,6 +29,9 @@ Flatten: TypeAlias = Literal["auto", "off"]
 Marks: TypeAlias = "str | Path | ArrayLike | None"
 MaterialSizes: TypeAlias = "Mapping[str | int, float] | None"
 SizesBetween: TypeAlias = "Mapping[tuple[str | int, str | int], float] | None"
+Merge: TypeAlias = "Mapping[tuple[str | int, ...], str] | None"
+Rename: TypeAlias = "Mapping[str | int, str] | None"
+Recolor: TypeAlias = "Mapping[str | int, pv.ColorLike] | None"
 Step: TypeAlias = "Literal['auto'] | float | tuple[float, float]"
 
 
@@ -178,6 +181,79 @@ def drop_materials(
     )
 
 
+def merge_materials(
+    image: pv.ImageData, merge: Mapping[tuple[str | int, ...], str], *, scalars: str | None = None
+) -> pv.ImageData:
+    """Make one material of several: boundaries between them vanish.
+
+    Parameters
+    ----------
+    image : pyvista.ImageData
+        One pixel thick; segmented first where it is not yet.
+    merge : mapping
+        Name of the new material by names or numbers of those that become it: ``{("quartz", "mica"): "hard"}``. It takes
+        number and colour of the one that has its name already, else of the first.
+    scalars : str, optional
+        Name of scalars to process. Defaults to currently active scalars.
+
+    Returns
+    -------
+    pyvista.ImageData
+        A copy with a new array ``material``.
+    """
+    return _edited(image, scalars, checked(merge=merge))
+
+
+def rename_materials(
+    image: pv.ImageData, rename: Mapping[str | int, str], *, scalars: str | None = None
+) -> pv.ImageData:
+    """Give materials other names: sets, files and later filters call them by these.
+
+    Parameters
+    ----------
+    image : pyvista.ImageData
+        One pixel thick; segmented first where it is not yet.
+    rename : mapping
+        New name by name or number: ``{"grey_87": "quartz"}``.
+    scalars : str, optional
+        Name of scalars to process. Defaults to currently active scalars.
+
+    Returns
+    -------
+    pyvista.ImageData
+        A copy with a new field array ``material_names``.
+    """
+    return _edited(image, scalars, checked(rename=rename))
+
+
+def recolor_materials(
+    image: pv.ImageData, recolor: Mapping[str | int, pv.ColorLike], *, scalars: str | None = None
+) -> pv.ImageData:
+    """Give materials other colours, which they are drawn in.
+
+    Parameters
+    ----------
+    image : pyvista.ImageData
+        One pixel thick; segmented first where it is not yet.
+    recolor : mapping
+        New colour by name or number: ``{"quartz": "orange"}``.
+    scalars : str, optional
+        Name of scalars to process. Defaults to currently active scalars.
+
+    Returns
+    -------
+    pyvista.ImageData
+        A copy with a new field array ``material_colors``.
+    """
+    return _edited(image, scalars, checked(recolor=recolor))
+
+
+def _edited(image: pv.ImageData, scalars: str | None, edits: Mapping[str, Any]) -> pv.ImageData:
+    found = datasets.segmented(image, scalars)
+    edited = core.picture.edit_materials(found.image, core.picture.EditOptions(**edits))
+    return datasets.with_materials(image, replace(found, image=edited), scalars)
+
+
 def boundaries(
     image: pv.ImageData, scalars: str | None = None, *, policy: Policy = "minority", progress_bar: bool = False
 ) -> pv.PolyData:
@@ -235,6 +311,9 @@ def mesh(
     tolerance: float = 0.0,
     keep: Sequence[str | int] = (),
     join: float | None = None,
+    merge: Merge = None,
+    rename: Rename = None,
+    recolor: Recolor = None,
     drop: Sequence[str | int] = (),
     drop_transparent: bool = False,
     periodic: Periodic = "none",
@@ -295,6 +374,12 @@ def mesh(
     join : float, optional
         Boundaries shorter than this between two junctions are joined, where sectors around stay wide. Defaults to two
         data points, or the tolerance; 0 for none.
+    merge : mapping, optional
+        Materials that become one, and its name; see `merge_materials`.
+    rename : mapping, optional
+        Other names of materials, after merging; all other parameters call them by these.
+    recolor : mapping, optional
+        Other colours of materials.
     drop : sequence, optional
         Materials that are left out, by name or number.
     drop_transparent : bool, default: False
@@ -351,6 +436,7 @@ def mesh(
     values |= checked(growth=growth, policy=policy, edge_ratio=edge_ratio, max_shift=max_shift, effort=effort)
     values |= checked(threads=threads, triangulator=triangulator, periodic=periodic)
     values |= checked(min_pixels=min_pixels, min_length=min_length, drop=drop)
+    values |= checked(merge=merge, rename=rename, recolor=recolor)
     early = checked(colors=colors, flatten=flatten, learn=learn, fill_void=fill_void)
     early |= checked(drop_transparent=drop_transparent)
     early |= _marked(image, scalars, marks)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyvista as pv
 import pyvista_validation
 
 import imgquad_core as core
@@ -106,17 +107,43 @@ def _marks(value: Any, name: str) -> Any:
 
 
 def _sizes(value: Any, name: str) -> dict[str | int, float]:
-    if value is None:
-        return {}
-    _validation.check_instance(value, Mapping, name=name)
-    return {_material(key, name): _length(size, f"{name}[{key!r}]") for key, size in value.items()}
+    return {_material(key, name): _length(size, f"{name}[{key!r}]") for key, size in _mapping(value, name).items()}
 
 
 def _sizes_between(value: Any, name: str) -> dict[tuple[str | int, str | int], float]:
+    return {_pair(key, name): _length(size, f"{name}[{key!r}]") for key, size in _mapping(value, name).items()}
+
+
+def _merges(value: Any, name: str) -> dict[tuple[str | int, ...], str]:
+    return {
+        tuple(_material(each, name) for each in _tuple(key, f"{name}: materials")): _name(new, f"{name}[{key!r}]")
+        for key, new in _mapping(value, name).items()
+    }
+
+
+def _new_names(value: Any, name: str) -> dict[str | int, str]:
+    return {_material(key, name): _name(new, f"{name}[{key!r}]") for key, new in _mapping(value, name).items()}
+
+
+def _new_colors(value: Any, name: str) -> dict[str | int, tuple[int, ...]]:
+    return {_material(key, name): pv.Color(color).int_rgb for key, color in _mapping(value, name).items()}
+
+
+def _mapping(value: Any, name: str) -> Mapping[Any, Any]:
     if value is None:
         return {}
     _validation.check_instance(value, Mapping, name=name)
-    return {_pair(key, name): _length(size, f"{name}[{key!r}]") for key, size in value.items()}
+    return dict(value)
+
+
+def _tuple(value: Any, name: str) -> tuple[Any, ...]:
+    _validation.check_instance(value, tuple, name=name)
+    return tuple(value)
+
+
+def _name(value: Any, name: str) -> str:
+    _validation.check_instance(value, str, name=name)
+    return str(value)
 
 
 def _pair(value: Any, name: str) -> tuple[str | int, str | int]:
@@ -173,6 +200,9 @@ _OWN: Mapping[str, Callable[[Any, str], Any]] = {
     "keep": _materials,
     "colors": _colors,
     "marks": _marks,
+    "merge": _merges,
+    "rename": _new_names,
+    "recolor": _new_colors,
     "min_pixels": _limit_of_noise,
     "min_length": _limit_of_noise,
     "drop": _materials,

@@ -29,9 +29,11 @@ from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
 from imgquad_core.picture import (
     Box,
     DenoiseOptions,
+    EditOptions,
     SegmentationOptions,
     crop_image,
     drop_materials,
+    edit_materials,
     list_removed,
     remove_noise,
     sizes_by_number,
@@ -57,6 +59,27 @@ class DropOptions:
     """Names or numbers of the materials that are left out."""
 
     drop: tuple[str, ...] = same_as(MeshOptions, "drop")
+
+
+@dataclass(frozen=True)
+class MergeOptions:
+    """Names or numbers of materials that become one, and its name."""
+
+    merge: Mapping[tuple[str, ...], str] = same_as(MeshOptions, "merge")
+
+
+@dataclass(frozen=True)
+class RenameOptions:
+    """New names of materials, by their names or numbers."""
+
+    rename: Mapping[str, str] = same_as(MeshOptions, "rename")
+
+
+@dataclass(frozen=True)
+class RecolorOptions:
+    """New colours of materials, by their names or numbers."""
+
+    recolor: Mapping[str, tuple[int, int, int]] = same_as(MeshOptions, "recolor")
 
 
 @dataclass(frozen=True)
@@ -154,6 +177,11 @@ def _crop(state: State, options: CropOptions) -> dict[str, Any]:
 
 def _drop(state: State, options: DropOptions) -> dict[str, Any]:
     state.put_labels(drop_materials(_labels(state), options.drop))
+    return _label_counts(_labels(state))
+
+
+def _edit(state: State, options: MergeOptions | RenameOptions | RecolorOptions) -> dict[str, Any]:
+    state.put_labels(edit_materials(_labels(state), EditOptions(**vars(options))))
     return _label_counts(_labels(state))
 
 
@@ -328,6 +356,9 @@ STEPS: Mapping[str, Step] = {
     "compute_label_by_color_clustering_per_pixel": Step(SegmentationOptions, _segment),
     "apply_label_noise_removal_per_pixel": Step(DenoiseOptions, _remove_noise),
     "apply_label_crop_per_pixel": Step(CropOptions, _crop),
+    "apply_material_merge_per_pixel": Step(MergeOptions, _edit),
+    "set_material_names_of_image": Step(RenameOptions, _edit),
+    "set_material_colors_of_image": Step(RecolorOptions, _edit),
     "delete_material_from_image": Step(DropOptions, _drop),
     "generate_polyline_from_material_boundaries": Step(ExtractionOptions, _extract),
     "apply_coord_material_boundary_smoothing": Step(SmoothingOptions, _smooth),

@@ -139,10 +139,21 @@ def _options(run: Run) -> dict[str, Any]:
         "min_length": run.noise.min_length,
         "triangulator": triangulator_used(run.options.triangulator),
     }
-    sizes = {str(name): size for name, size in run.options.material_sizes.items()}
+    sizes = _by_text(run.options.material_sizes)
     marks = None if run.options.marks is None else str(run.options.marks)
     between = {",".join(map(str, pair)): size for pair, size in run.options.sizes_between.items()}
-    return values | used | {"material_sizes": sizes, "sizes_between": between, "step": list(run.step), "marks": marks}
+    merged = {",".join(map(str, names)): name for names, name in run.options.merge.items()}
+    edits = {"merge": merged, "rename": _by_text(run.options.rename), "recolor": _by_text(run.options.recolor)}
+    return (
+        values
+        | used
+        | edits
+        | {"material_sizes": sizes, "sizes_between": between, "step": list(run.step), "marks": marks}
+    )
+
+
+def _by_text(values: Mapping[Any, Any]) -> dict[str, Any]:
+    return {str(material): value for material, value in values.items()}
 
 
 def _counts(run: Run) -> dict[str, dict[str, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -266,8 +267,25 @@ def test_nan_is_void_and_empty_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="pixels: give at least one"):
         read_picture(tmp_path / "zero.npy")
     np.save(tmp_path / "objects.npy", np.array([[None]]), allow_pickle=True)
-    with pytest.raises(InputError, match=r"Python objects: .*numpy\.save"):
-        read_picture(tmp_path / "objects.npy")
+    (tmp_path / "pickle.npy").write_bytes(pickle.dumps(np.zeros((3, 3))))
+    for name in ("objects.npy", "pickle.npy"):
+        with pytest.raises(InputError, match=r"Python objects .*never loaded: .*numpy\.save") as caught:
+            read_picture(tmp_path / name)
+        assert "allow_pickle" not in str(caught.value)
+
+
+def test_a_picture_is_called_by_its_name_in_messages(tmp_path: Path) -> None:
+    path = tmp_path / "upload.picture"
+    Image.fromarray(GREY).save(path, format="PNG")
+    assert read_picture(path, name="steel.png").name == "steel.png"
+    with pytest.raises(InputError, match=r"^steel\.png has 4 x 3 = 12 pixels, more than"):
+        read_picture(path, ReadOptions(max_pixels=11), "steel.png")
+    for data in (b"", b"hello", path.read_bytes()[:60]):
+        path.write_bytes(data)
+        with pytest.raises(InputError) as caught:
+            read_picture(path, name="steel.png")
+        assert "steel.png" in str(caught.value)
+        assert "upload" not in str(caught.value)
 
 
 def test_arrays_in_memory_mean_what_files_mean() -> None:

@@ -89,6 +89,20 @@ def test_dropped_material_leaves_a_hole(disc: Path, tmp_path: Path) -> None:
     assert np.array_equal(np.load(labels), np.where(disc_labels() == 3, -1, 1))
 
 
+def test_materials_are_merged_renamed_and_recoloured(disc: Path, tmp_path: Path) -> None:
+    edits = ("--rename", "3=the, disc", "--recolor", "the, disc=#ff8000", "--rename", "1=ground")
+    assert run(disc, tmp_path / "a.vtu", *edits, "--drop", "ground", "--report", tmp_path / "a.json", "--quiet") == 0
+    grid = pv.read(tmp_path / "a.vtu")
+    assert list(grid.field_data["material_names"]) == ["ground", "the, disc"]
+    assert grid.field_data["material_colors"][1].tolist() == [255, 128, 0]
+    told = json.loads((tmp_path / "a.json").read_text())
+    assert told["options"]["rename"] == {"3": "the, disc", "1": "ground"}
+    assert [row["name"] for row in told["materials"]] == ["ground", "the, disc"]
+    assert run(disc, tmp_path / "b.vtu", "--merge", "1,3=all", "--report", tmp_path / "b.json", "--quiet") == 0
+    assert set(pv.read(tmp_path / "b.vtu").cell_data["material"]) == {1}
+    assert json.loads((tmp_path / "b.json").read_text())["options"]["merge"] == {"1,3": "all"}
+
+
 def test_crop_counts_from_the_upper_left_corner(disc: Path, tmp_path: Path) -> None:
     labels = tmp_path / "labels.npy"
     assert run(disc, tmp_path / "mesh.vtu", "--crop", "10,5,40,25", "--labels-out", labels, "--quiet") == 0

@@ -132,6 +132,20 @@ def test_dropped_material_leaves_a_hole() -> None:
     assert areas(grid).sum() == pytest.approx((labels() != 1).sum(), rel=0.01)
 
 
+def test_materials_are_merged_renamed_and_recoloured_in_a_chain_as_at_once() -> None:
+    chain = (
+        point_image()
+        .imgquad.merge_materials({("material 0", 2): "rest"})
+        .imgquad.rename_materials({1: "disc"})
+        .imgquad.recolor_materials({"disc": "orange"})
+    )
+    assert list(chain.field_data["material_names"]) == ["rest", "disc"]
+    assert chain.field_data["material_colors"][1].tolist() == [255, 165, 0]
+    whole = point_image().imgquad.mesh(merge={(0, 2): "rest"}, rename={1: "disc"}, recolor={"disc": (255, 165, 0)})
+    assert_same(chain.imgquad.mesh(), whole)
+    assert set(whole["material"]) == {0, 1}
+
+
 def test_transparent_pixels_are_left_out_on_demand() -> None:
     rgba = np.dstack([photo(), np.where(labels() == 1, 0, 255).astype(np.uint8)])
     grid = point_image(rgba).imgquad.mesh(colors=3, drop_transparent=True)

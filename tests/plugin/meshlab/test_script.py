@@ -101,6 +101,9 @@ def test_stages_that_a_script_leaves_out_run_with_their_defaults(tmp_path: Path)
         MeshOptions(size=3.0),
         MeshOptions(size=2.5 + 1e-13, growth=1.1 + 0.2, min_pixels=3, min_length=3.3, effort="fast", pixel_size=0.1),
         MeshOptions(material_sizes={"3": 1.7, "0": 3.5}, boundary_size=2.1, drop=("5",), crop=(1, 1, 28, 20)),
+        MeshOptions(
+            merge={("0", "3"): "a, b"}, rename={5: 'the "c"'}, recolor={"a, b": (1, 2, 255)}, drop=('the "c"',)
+        ),
     ],
 )
 def test_run_saved_as_script_gives_the_same_mesh_to_the_bit(options: MeshOptions, tmp_path: Path) -> None:
@@ -133,6 +136,23 @@ def test_materials_are_cropped_dropped_and_sized_by_name(tmp_path: Path) -> None
     assert result.mesh is not None
     assert len(result.layers[3].edges) == len(result.mesh.constraints)
     assert result.current is result.layers[2]
+
+
+def test_materials_are_merged_renamed_and_recoloured(tmp_path: Path) -> None:
+    path = script_file(
+        tmp_path,
+        filter_xml("Image: Merge Materials", 'name="merge" type="RichString" value=\'&quot;0,3=ground&quot;\''),
+        filter_xml("Image: Rename Materials", 'name="rename" type="RichString" value="5=disc"'),
+        filter_xml("Image: Recolor Materials", 'name="recolor" type="RichString" value="disc=#ff8000"'),
+        filter_xml("Quad Mesh: From Material Boundaries"),
+    )
+    result = run_script(path, image=LABELS)
+    assert result.values("apply_material_merge_per_pixel")["materials_number"] == 2
+    assert result.mesh is not None
+    assert result.mesh.materials.names == ("ground", "disc")
+    assert result.mesh.materials.colors[1].tolist() == [255, 128, 0]
+    at_once = MeshOptions(merge={(0, 3): "ground"}, rename={5: "disc"}, recolor={"disc": (255, 128, 0)})
+    assert np.array_equal(result.mesh.points, mesh_image(LABELS, at_once).points)
 
 
 def test_files_are_written_beside_the_script(tmp_path: Path) -> None:
