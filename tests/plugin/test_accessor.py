@@ -92,7 +92,7 @@ print(mesh.n_cells, mesh.imgquad.quality()["scaled_jacobian"].min() > 0.5)
 def test_an_older_pyvista_is_told_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(pv, "register_dataset_accessor")
     monkeypatch.delitem(sys.modules, "imgquad_mesh.accessor")
-    with pytest.raises(ImportError, match=r"needs PyVista 0\.48 or newer.*pip install -U pyvista"):
+    with pytest.raises(ImportError, match=r"needs PyVista 0\.49 or newer.*pip install -U pyvista"):
         import imgquad_mesh.accessor  # noqa: F401
 
 
