@@ -1,8 +1,7 @@
-"""Values that cannot be changed, but copied and sent to other processes. Imports no NumPy, as options use it."""
+"""A mapping that cannot be changed, but copied and sent to other processes. Imports no NumPy, as options use it."""
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any, NoReturn, TypeVar
 
 K = TypeVar("K")
@@ -22,10 +21,3 @@ class FrozenMapping(dict[K, V]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (dict(self),)
-
-
-class Value:
-    """Base of values of arrays: copied and pickled by what they are made of, so that arrays stay read-only."""
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]

@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Bytes, Floats, Ints, Labels
-from .frozen import Value
+from .arrays import Bytes, Floats, Ints, Labels, Value
 
 VOID = -1  #: label of a pixel, or region beside a chain, that is not meshed
 
@@ -28,12 +26,6 @@ class PointKind(IntEnum):
     FRAME = 2  #: on the picture's border, inside a chain: slides along the border
     CORNER = 3  #: a corner of the picture or a sharp corner of a chain: stays
     INTERIOR = 4  #: of a mesh only, on no chain: moves freely
-
-
-def _frozen(values: ArrayLike, dtype: Any, ndim: int) -> NDArray[Any]:
-    array = np.array(values, dtype=dtype, order="C", ndmin=ndim)
-    array.flags.writeable = False
-    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +53,9 @@ class Materials(Value):
     orientations: Floats | None = None
 
     def __post_init__(self) -> None:
-        if self.orientations is not None:
-            object.__setattr__(self, "orientations", _frozen(self.orientations, np.float64, 2))
-        object.__setattr__(self, "labels", _frozen(self.labels, np.int32, 1))
         object.__setattr__(self, "names", tuple(self.names))
-        object.__setattr__(self, "colors", _frozen(np.reshape(self.colors, (-1, 3)), np.uint8, 2))
+        object.__setattr__(self, "colors", np.reshape(self.colors, (-1, 3)))
+        super().__post_init__()
 
     def name_of(self, label: int) -> str:
         """Name of material number `label`."""
@@ -88,13 +78,18 @@ class LabelImage(Value):
     labels: Labels
     materials: Materials
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "labels", _frozen(self.labels, np.int32, 2))
-
     @property
     def shape(self) -> tuple[int, int]:
         """(n_rows, n_cols)."""
         return self.labels.shape[0], self.labels.shape[1]
+
+
+class Chains(NamedTuple):
+    """Polylines of boundaries, as they are handed on: see `BoundaryGraph`."""
+
+    offsets: Ints  #: (n_chains + 1,) chain c has the points ``points[offsets[c]:offsets[c + 1]]``
+    points: Ints  #: ids
+    regions: Ints  #: (n_chains, 2) region on the left and on the right
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,22 +131,15 @@ class BoundaryGraph(Value):
     region_pixels: Ints
     shape: tuple[int, int]
 
-    def __post_init__(self) -> None:
-        for name, dtype, ndim in (
-            ("points", np.float64, 2),
-            ("point_kind", np.uint8, 1),
-            ("chain_offsets", np.int64, 1),
-            ("chain_points", np.int64, 1),
-            ("chain_regions", np.int64, 2),
-            ("region_label", np.int32, 1),
-            ("region_pixels", np.int64, 1),
-        ):
-            object.__setattr__(self, name, _frozen(getattr(self, name), dtype, ndim))
-
     @property
     def n_chains(self) -> int:
         """Number of chains."""
         return len(self.chain_offsets) - 1
+
+    @property
+    def chains(self) -> Chains:
+        """All chains in one value."""
+        return Chains(self.chain_offsets, self.chain_points, self.chain_regions)
 
     def chain(self, c: int) -> Ints:
         """Ids of the points of chain `c`, in order."""
@@ -195,19 +183,6 @@ class QuadMesh(Value):
     chain_regions: Ints
     materials: Materials
 
-    def __post_init__(self) -> None:
-        for name, dtype, ndim in (
-            ("points", np.float64, 2),
-            ("point_kind", np.uint8, 1),
-            ("quads", np.int64, 2),
-            ("quad_region", np.int64, 1),
-            ("region_label", np.int32, 1),
-            ("chain_offsets", np.int64, 1),
-            ("chain_points", np.int64, 1),
-            ("chain_regions", np.int64, 2),
-        ):
-            object.__setattr__(self, name, _frozen(getattr(self, name), dtype, ndim))
-
     @property
     def n_points(self) -> int:
         """Number of points."""
@@ -217,6 +192,11 @@ class QuadMesh(Value):
     def n_quads(self) -> int:
         """Number of quads."""
         return len(self.quads)
+
+    @property
+    def chains(self) -> Chains:
+        """All chains in one value."""
+        return Chains(self.chain_offsets, self.chain_points, self.chain_regions)
 
     @cached_property
     def quad_material(self) -> Labels:

@@ -29,6 +29,7 @@ from .boundary import (
 from .errors import InputError
 from .frozen import FrozenMapping
 from .geometry.corner_rule import corner_rule
+from .jit import share_on_disk
 from .mesher import MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .options import MeshOptions
@@ -408,3 +409,8 @@ def _assert_feasible(shape: tuple[int, int], size: float) -> None:
             f"size {size:g} would need about {quads:.2g} quads for {cols} x {rows} pixels: at most {MOST_QUADS:.0e} "
             "are made; ask for a larger size, crop the picture, or mend its spacing"
         )
+
+
+def share_compiled() -> float:
+    """Return which share of all kernels an earlier run has left on disk, from 0 to 1: this module imports them all."""
+    return share_on_disk()

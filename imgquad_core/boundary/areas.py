@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Floats, Ints
 from imgquad_core.chains import Places, places_of
-from imgquad_core.model import BoundaryGraph
+from imgquad_core.model import BoundaryGraph, Chains
 
 _STEPS = 5  # of Newton towards the wanted areas, at most; most end sooner, at `_GOOD`
 _SMALL = 50  # px; smaller regions take what cannot be given to all
@@ -24,17 +24,20 @@ _SHARPEST = 0.2  # 1 + cos of the largest turn that is mitred, 143 degrees
 _GOOD = 1e-4  # share of a region's area that may stay missing
 
 
-def polygon_areas(points: Floats, chain_points: Ints, offsets: Ints, sides: Ints, n_regions: int) -> Floats:
+def polygon_areas(points: Floats, chains: Chains, n_regions: int) -> Floats:
     """Area of each region within its chains, shape (n_regions,).
 
     Parameters
     ----------
-    points, chain_points, offsets, sides
-        As `points`, `chain_points`, `chain_offsets` and `chain_regions` of `BoundaryGraph`.
+    points : float64, shape (n, 2)
+        All points.
+    chains : Chains
+        Outlines of the regions.
     n_regions : int
         Number of regions.
     """
-    return _areas(_swept(points, places_of(chain_points, offsets), len(sides)), sides, n_regions)
+    swept = _swept(points, places_of(chains.points, chains.offsets), len(chains.regions))
+    return _areas(swept, chains.regions, n_regions)
 
 
 def _areas(swept: Floats, sides: Ints, n_regions: int) -> Floats:
@@ -44,7 +47,7 @@ def _areas(swept: Floats, sides: Ints, n_regions: int) -> Floats:
 
 
 def restore_areas(
-    points: Floats, chain_points: Ints, offsets: Ints, sides: Ints, target: NDArray[Any], bound: Floats, shift: Floats
+    points: Floats, chains: Chains, target: NDArray[Any], bound: Floats, shift: Floats
 ) -> tuple[Floats, Floats]:
     """Shift chains across so that the regions get their areas.
 
@@ -52,13 +55,11 @@ def restore_areas(
     ----------
     points : float64, shape (n, 2)
         All points.
-    chain_points, offsets : int64
-        Chains as in `BoundaryGraph`.
-    sides : int64, shape (n_chains, 2)
-        Region on the left and on the right of each chain, -1 for none.
+    chains : Chains
+        Outlines of the regions.
     target : int64 or float64, shape (n_regions,)
         Wanted areas.
-    bound : float64, shape (len(chain_points),)
+    bound : float64, shape (len(chains.points),)
         How far the segments at each point of a chain may be shifted; 0 at least at the ends of open chains.
     shift : float64, shape (n_chains,)
         Shifts to start from.
@@ -70,7 +71,7 @@ def restore_areas(
     shift : float64, shape (n_chains,)
         How far each chain went to its left, where its points' bounds let it.
     """
-    places, most = places_of(chain_points, offsets), bound.max()
+    places, sides, most = places_of(chains.points, chains.offsets), chains.regions, bound.max()
     bound = bound[places.at]
     normal = mitres(points, places)
     moved = _moved(points, places, bound, normal, shift)
@@ -179,10 +180,4 @@ def enclosed_areas(graph: BoundaryGraph) -> Floats:
 
     Compare with `graph.region_pixels` for the error of smoothing.
     """
-    return polygon_areas(
-        np.array(graph.points),
-        np.array(graph.chain_points),
-        np.array(graph.chain_offsets),
-        graph.chain_regions,
-        len(graph.region_label),
-    )
+    return polygon_areas(graph.points, graph.chains, len(graph.region_label))

@@ -132,9 +132,7 @@ def _lacks(graph: BoundaryGraph, side: _Side, heights: Floats) -> bool:
 
 
 def _areas(graph: BoundaryGraph) -> Floats:
-    return polygon_areas(
-        graph.points, graph.chain_points, graph.chain_offsets, graph.chain_regions, len(graph.region_label)
-    )
+    return polygon_areas(graph.points, graph.chains, len(graph.region_label))
 
 
 def _with_areas(graph: BoundaryGraph, areas: Floats) -> BoundaryGraph:
@@ -142,10 +140,7 @@ def _with_areas(graph: BoundaryGraph, areas: Floats) -> BoundaryGraph:
     is_free = graph.point_kind[graph.chain_points] == PointKind.FREE
     for share in (1.0, 0.5, 0.25):
         bound = np.where(is_free, share * AREA_ROOM, 0.0)
-        points, _ = restore_areas(
-            graph.points, graph.chain_points, graph.chain_offsets, graph.chain_regions, areas, bound,
-            np.zeros(graph.n_chains),
-        )  # fmt: skip
+        points, _ = restore_areas(graph.points, graph.chains, areas, bound, np.zeros(graph.n_chains))
         moved = replace(graph, points=snapped(points))
         if not _crossing(moved, 1) and not _crossing(moved, 2):
             return moved

@@ -15,6 +15,7 @@ from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.chains import places_of
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.conflicts import SHARP, UNITS, snapped
+from imgquad_core.model import Chains
 
 from .areas import mitres, restore_areas
 from .curves import Curves, Ends, per_point, pin_ends
@@ -172,11 +173,12 @@ def restore_areas_freely(
         Mind room and sectors too, as the nodes do.
     """
     placed = nodes.placed
+    chains = Chains(placed.offsets, nodes.chain_points, sides)
     bound = _area_bounds(draft.curves, nodes, room, max_shift)
     shift, tested = np.zeros(len(sides)), nodes.points
     had_conflicts = np.zeros(len(sides), bool)
     for attempt in range(_AREA_ROUNDS):
-        points, shift = restore_areas(nodes.points, nodes.chain_points, placed.offsets, sides, areas, bound, shift)
+        points, shift = restore_areas(nodes.points, chains, areas, bound, shift)
         points = snapped(points, draft.units)
         has_moved = any_of_chain((points != tested).any(axis=1)[nodes.chain_points], placed.offsets)
         has_moved |= had_conflicts

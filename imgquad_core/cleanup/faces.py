@@ -8,7 +8,7 @@ import numpy as np
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
 from imgquad_core.jit import kernel
-from imgquad_core.model import Materials, PointKind, QuadMesh
+from imgquad_core.model import Chains, Materials, PointKind, QuadMesh
 
 QUARTER = np.pi / 2
 INNER_VALENCE = 4
@@ -78,7 +78,7 @@ def stitched(
     place: Ints,
     points: Floats,
     kind: Bytes,
-    chains: tuple[Ints, Ints, Ints],
+    chains: Chains,
     region_label: Labels,
     materials: Materials,
 ) -> QuadMesh:
@@ -92,8 +92,8 @@ def stitched(
         What the point of the boundary `origin` is called in the mesh.
     points, kind
         The boundary's points, in the mesh's order.
-    chains : tuple
-        Offsets, points and regions of the chains of the mesh.
+    chains : Chains
+        Of the mesh.
     region_label, materials
         Of the mesh.
     """

@@ -129,5 +129,5 @@ def _stitch(mesh: QuadMesh, quads: FaceQuads) -> QuadMesh:
     rim = np.unique(mesh.chain_points)
     place = np.full(mesh.n_points, -1, np.int64)
     place[rim] = np.arange(len(rim))
-    chains = (mesh.chain_offsets, place[mesh.chain_points], mesh.chain_regions)
+    chains = mesh.chains._replace(points=place[mesh.chain_points])
     return stitched(quads, place, mesh.points[rim], mesh.point_kind[rim], chains, mesh.region_label, mesh.materials)

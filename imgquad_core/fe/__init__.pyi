@@ -1,6 +1,7 @@
 from .elements import make_elements
 from .femesh import FEMesh
 from .options import ElementOptions
+from .properties import read_properties
 from .sets import fe_mesh, without_interfaces
 from .triangles import split_quads
 
@@ -9,6 +10,7 @@ __all__ = [
     "FEMesh",
     "fe_mesh",
     "make_elements",
+    "read_properties",
     "split_quads",
     "without_interfaces",
 ]

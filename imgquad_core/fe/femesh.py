@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from imgquad_core.arrays import Bytes, Floats, Ints, Labels
-from imgquad_core.frozen import FrozenMapping, Value
+from imgquad_core.arrays import Bytes, Floats, Ints, Labels, Value, read_only
+from imgquad_core.frozen import FrozenMapping
 from imgquad_core.model import Materials
 
 
@@ -39,14 +39,8 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
 )
 
 
-def _frozen(values: ArrayLike, dtype: Any) -> NDArray[Any]:
-    array = np.array(values, dtype=dtype, order="C")
-    array.flags.writeable = False
-    return array
-
-
 def _frozen_sets(sets: Mapping[str, ArrayLike]) -> Mapping[str, Ints]:
-    return FrozenMapping({name: _frozen(ids, np.int64) for name, ids in sets.items()})
+    return FrozenMapping({name: read_only(ids, np.int64) for name, ids in sets.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,18 +96,7 @@ class FEMesh(Value):
     element_sets: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, dtype in (
-            ("points", np.float64),
-            ("cells", np.int64),
-            ("cell_material", np.int32),
-            ("cell_region", np.int64),
-            ("point_kind", np.uint8),
-            ("chain_offsets", np.int64),
-            ("chain_points", np.int64),
-            ("cohesive", np.int64),
-            ("cohesive_pair", np.int32),
-        ):
-            object.__setattr__(self, name, _frozen(getattr(self, name), dtype))
+        super().__post_init__()
         for name in ("node_sets", "side_sets", "periodic", "element_sets"):
             object.__setattr__(self, name, _frozen_sets(getattr(self, name)))
 

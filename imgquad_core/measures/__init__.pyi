@@ -1,4 +1,5 @@
 from .quality import (
+    MIN_QUALITY,
     QualityReport,
     aspect,
     bad_places,
@@ -13,6 +14,7 @@ from .quality import (
 from .sampling import area_means
 
 __all__ = [
+    "MIN_QUALITY",
     "QualityReport",
     "area_means",
     "aspect",

@@ -71,8 +71,7 @@ def mesh_boundaries(
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
     """Join faces at the boundary's points."""
     graph, place = without_unused_points(graph)
-    chains = (graph.chain_offsets, graph.chain_points, graph.chain_regions)
-    return stitched(joined(parts), place, graph.points, graph.point_kind, chains, graph.region_label, materials)
+    return stitched(joined(parts), place, graph.points, graph.point_kind, graph.chains, graph.region_label, materials)
 
 
 def _slid(mesh: QuadMesh, rounds: int, threads: int, portions: Portions) -> QuadMesh:

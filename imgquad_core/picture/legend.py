@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imgquad_core.arrays import Flags, Floats, Labels
+from imgquad_core.arrays import Flags, Floats, Labels, Value
 from imgquad_core.errors import InputError
-from imgquad_core.frozen import Value
 from imgquad_core.model import VOID, LabelImage, Materials
 from imgquad_core.reading.picture import Picture
 

@@ -17,7 +17,7 @@ from imgquad_core.boundary.extraction import ExtractionOptions, extract_boundari
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.corner_rule import POLICIES
-from imgquad_core.model import BoundaryGraph, PointKind
+from imgquad_core.model import BoundaryGraph, Chains, PointKind
 from support import naive
 from support.labels import any_labels, disc, half_plane, label_image, spiral, square, voronoi, wedge
 from support.planar import check_meshable, check_planar
@@ -189,7 +189,7 @@ def test_areas_are_given_back_without_turning_the_sides_of_corners() -> None:
     corners = np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]])
     ring, turn = np.array([0, 1, 2, 3, 0]), np.array([0, 5])
     sides, area = np.array([[0, -1]]), np.array([100.0])
-    moved, _ = restore_areas(corners, ring, turn, sides, area, np.full(5, 2.0), np.zeros(1))
+    moved, _ = restore_areas(corners, Chains(turn, ring, sides), area, np.full(5, 2.0), np.zeros(1))
     assert np.allclose(moved, 1.25 * (corners - 4.0) + 4.0, atol=1e-3)
 
 
