@@ -6,9 +6,13 @@ import argparse
 import signal
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from io import TextIOWrapper
 from typing import NoReturn
 
+from imgquad_core.errors import ImgquadError, InputError, QualityError
+
+from . import cli
 from .cli.interruption import handling_signals
 
 GOOD, BUG, BAD_INPUT, LIMIT_NOT_MET = 0, 1, 2, 3
@@ -25,8 +29,6 @@ class Parser(argparse.ArgumentParser):
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of the command with all its subcommands."""
-    from .cli import demo, list_filters, run, script
-
     parser = Parser(
         prog="imgquad-mesh",
         description="Turns any picture of a structure into an all-quadrilateral, multi-material finite element mesh.",
@@ -34,7 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
-    for command in (run, demo, script, list_filters):
+    for command in (cli.run, cli.demo, cli.script, cli.list_filters):
         command.add_parser(subparsers)
     return parser
 
@@ -60,8 +62,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _told(error: Exception) -> tuple[object, int]:
     """Return what to say of an error, and the exit code; raise it where it is none of ours."""
-    from imgquad_core.errors import ImgquadError, InputError, QualityError
-
     if isinstance(error, QualityError):
         return error, LIMIT_NOT_MET
     if isinstance(error, InputError):
@@ -79,8 +79,6 @@ def _failed(reason: object, code: int) -> int:
 
 
 def _version() -> str:
-    from importlib.metadata import version
-
     return f"imgquad-mesh {version('imgquad-mesh')}"
 
 

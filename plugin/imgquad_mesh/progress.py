@@ -22,7 +22,7 @@ DOING = {
 @contextmanager
 def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, int, int], None]]:
     """Give a function to call as each stage starts; it draws a bar if one is wanted and there is a terminal."""
-    from rich.console import Console
+    from rich.console import Console  # not above: rich takes longer than the whole accessor
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)

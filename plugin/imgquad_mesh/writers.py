@@ -9,6 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import imgquad_core as core
+
 from .datasets.grids import from_grid
 
 
@@ -36,11 +38,8 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
     --------
     >>> grid.save("part.inp", analysis="plane strain", order=2)  # doctest: +SKIP
     """
-    from imgquad_core.fe import ElementOptions, make_elements
-    from imgquad_core.writers import write_mesh
-
     known = ("order", "nodes", "cohesive", "extrude", "layers", "periodic", "split_quads")
     chosen = {name: options.pop(name) for name in known if name in options}
     between = options.pop("interfaces") if options.get("interfaces") in ("sides", "none") else None
-    elements = ElementOptions(**chosen, open_interfaces=between == "sides", mark_interfaces=between != "none")
-    write_mesh(make_elements(from_grid(dataset), elements), path, **options)
+    elements = core.fe.ElementOptions(**chosen, open_interfaces=between == "sides", mark_interfaces=between != "none")
+    core.writers.write_mesh(core.fe.make_elements(from_grid(dataset), elements), path, **options)

@@ -8,13 +8,12 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+import imgquad_core as core
+
 
 def announce_compiling() -> None:
     """Say so if this is the first run, which takes longer."""
-    import imgquad_core.pipeline  # noqa: F401  (imports all kernels)
-    from imgquad_core.jit import share_on_disk
-
-    if share_on_disk() < 0.5:
+    if core.pipeline.share_compiled() < 0.5:
         Console(stderr=True).print("first run on this machine: compiling the kernels takes about half a minute, once")
 
 

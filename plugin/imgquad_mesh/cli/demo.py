@@ -6,7 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+import imgquad_core as core
 from imgquad_core.errors import InputError
+from imgquad_mesh import cli, outputs
 
 from .run import Outputs, mesh_to_files
 
@@ -21,20 +23,15 @@ def add_parser(subparsers: Any) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the demo into `args.folder`; return the exit code."""
-    from imgquad_core.options import MeshOptions
-    from imgquad_mesh.outputs.files import replace_file
-
-    from .rock_picture import rock_picture
-
     folder: Path = args.folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot make the folder {folder}: {error.strerror}; give another one") from error
     picture = folder / "rock.png"
-    replace_file(picture, rock_picture().save)
-    outputs = Outputs(folder / "rock.vtu", report=folder / "rock.json", picture=folder / "mesh.png")
-    options = MeshOptions(size=5.0, min_pixels=12, min_length=6)
-    code = mesh_to_files(picture, options, outputs)
-    print(f"look at {picture} and {outputs.picture}; open {outputs.mesh} in ParaView or with pyvista.read")
+    outputs.replace_file(picture, cli.rock_picture.rock_picture().save)
+    files = Outputs(folder / "rock.vtu", report=folder / "rock.json", picture=folder / "mesh.png")
+    options = core.MeshOptions(size=5.0, min_pixels=12, min_length=6)
+    code = mesh_to_files(picture, options, files)
+    print(f"look at {picture} and {files.picture}; open {files.mesh} in ParaView or with pyvista.read")
     return code

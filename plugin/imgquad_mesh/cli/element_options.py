@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+import imgquad_core as core
 from imgquad_core.errors import InputError
 from imgquad_core.fe import ElementOptions
 from imgquad_mesh.texts import number
@@ -63,23 +64,20 @@ def writer_options(args: argparse.Namespace) -> dict[str, Any]:
     InputError
         The format has no such option, or the file of properties cannot be used: said before any work is done.
     """
-    from imgquad_core.fe.properties import read_properties
-    from imgquad_core.writers import WITHOUT_COHESIVE, WRITERS, options_of
-    from imgquad_core.writers.common import no_cohesive
-
+    writers = core.writers
     asked = {name: getattr(args, "version_" if name == "version" else name, None) for name in WRITER_OPTIONS}
     given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
     if given.get("interfaces") in BETWEEN:  # not the writer's, see `element_options`
         del given["interfaces"]
     extension = args.output.suffix.lower()
-    known = options_of(WRITERS[extension]) if extension in WRITERS else PLAIN.get(extension, ())
+    known = writers.options_of(writers.WRITERS[extension]) if extension in writers.WRITERS else PLAIN.get(extension, ())
     for name in given:
         if name not in known:
             option = "--msh-version" if name == "version" else f"--{name}"
             option += f" {given[name]}" if name == "interfaces" else ""
             raise InputError(f"{extension} files have no {option}: leave it out, or write another format")
-    if args.cohesive and args.interfaces != "sides" and extension in WITHOUT_COHESIVE:
-        raise InputError(no_cohesive(WITHOUT_COHESIVE[extension]))
+    if args.cohesive and args.interfaces != "sides" and extension in writers.WITHOUT_COHESIVE:
+        raise InputError(writers.no_cohesive(writers.WITHOUT_COHESIVE[extension]))
     if "properties" in given:
-        given["properties"] = read_properties(given["properties"])
+        given["properties"] = core.fe.read_properties(given["properties"])
     return given

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from imgquad_mesh import meshlab
+
 
 def add_parser(subparsers: Any) -> None:
     """Add the subcommand."""
@@ -18,8 +20,7 @@ def add_parser(subparsers: Any) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print what `args` asks for; return the exit code."""
-    from imgquad_mesh.meshlab import templates
-
+    templates = meshlab.templates
     if args.mlx:
         print(templates.filter_script(templates.named_filters(args.mlx)), end="")
     elif args.markdown:

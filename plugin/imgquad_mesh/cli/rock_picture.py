@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
+from PIL import Image
+from scipy.spatial import cKDTree
 
 PALETTE = ((222, 203, 164), (178, 116, 88), (120, 140, 150), (84, 92, 70), (245, 245, 240), (35, 45, 70))
 VEIN, PORE = 4, 5
@@ -38,10 +35,8 @@ def rock_labels(columns: int = 420, rows: int = 280, grain: int = 52, noise: flo
     return labels
 
 
-def rock_picture() -> Image:
+def rock_picture() -> Image.Image:
     """Return the picture of a rock, with its palette."""
-    from PIL import Image
-
     picture = Image.fromarray(rock_labels())
     picture.putpalette([value for color in PALETTE for value in color])  # the indices are the materials
     return picture
@@ -49,8 +44,6 @@ def rock_picture() -> Image:
 
 def _grains(rng: np.random.Generator, x: NDArray[np.float64], y: NDArray[np.float64], grain: int) -> NDArray[np.uint8]:
     """Return minerals 0 to 3 of grains around jittered grid points, with wavy borders."""
-    from scipy.spatial import cKDTree
-
     rows, cols = x.shape
     centres = np.stack(np.meshgrid(np.arange(-1, cols // grain + 2), np.arange(-1, rows // grain + 2)), axis=-1)
     seeds = (centres.reshape(-1, 2) + rng.uniform(0.1, 0.9, (centres.shape[0] * centres.shape[1], 2))) * grain

@@ -7,19 +7,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import imgquad_core as core
 from imgquad_core.errors import InputError
+from imgquad_mesh import cli, datasets, meshlab, outputs
+from imgquad_mesh.progress import progress_bar_if
 from imgquad_mesh.texts import number
 
 from .element_options import add_element_options, element_options, writer_options
 from .mesh_options import add_mesh_options, mesh_options
 from .script import print_crosscheck
-
-if TYPE_CHECKING:
-    from imgquad_core.fe import ElementOptions
-    from imgquad_core.options import MeshOptions
-    from imgquad_core.pipeline import Run
 
 
 def add_parser(subparsers: Any) -> None:
@@ -54,10 +52,8 @@ class Outputs:
 
     def check(self, *inputs: Path | None) -> None:
         """Raise `InputError` if one of them could not be written or is one of `inputs`, before any work is done."""
-        from imgquad_mesh.outputs.files import check_files, check_target, mesh_extensions
-
         allowed = {
-            "mesh": mesh_extensions(),
+            "mesh": outputs.mesh_extensions(),
             "labels": (".npy", ".png"),
             "boundaries": (".vtp",),
             "report": (".json",),
@@ -66,27 +62,27 @@ class Outputs:
         }
         targets = {name: path for name in allowed if (path := getattr(self, name)) is not None}
         for name, path in targets.items():
-            check_target(path, allowed[name])
-        check_files(inputs, targets.values())
+            outputs.check_target(path, allowed[name])
+        outputs.check_files(inputs, targets.values())
 
 
 @dataclass(frozen=True)
 class Writing:
     """Which elements the mesh is made of, the options of its writer, and the files that these were read from."""
 
-    elements: ElementOptions | None = None
+    elements: core.fe.ElementOptions | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     inputs: tuple[Path | None, ...] = ()
 
 
 def execute(args: argparse.Namespace) -> int:
     """Mesh the picture that `args` names; return the exit code."""
-    outputs = Outputs(args.output, args.labels_out, args.boundaries_out, args.report, args.picture, args.save_script)
+    to = Outputs(args.output, args.labels_out, args.boundaries_out, args.report, args.picture, args.save_script)
     writing = Writing(element_options(args), writer_options(args), (args.properties,))
     return mesh_to_files(
         args.image,
         mesh_options(args),
-        outputs,
+        to,
         writing,
         quiet=args.quiet,
         min_quality=args.min_quality,
@@ -96,8 +92,8 @@ def execute(args: argparse.Namespace) -> int:
 
 def mesh_to_files(
     image: Path,
-    options: MeshOptions,
-    outputs: Outputs,
+    options: core.MeshOptions,
+    to: Outputs,
     writing: Writing | None = None,
     *,
     quiet: bool = False,
@@ -114,74 +110,59 @@ def mesh_to_files(
         A quad is below `min_quality`, or with `crosscheck` another program measures other figures; all files are
         written.
     """
-    from imgquad_core.measures.quality import MIN_QUALITY, require_quality
-    from imgquad_mesh.meshlab.pymeshlab_filters import meshlab_filters
-    from imgquad_mesh.outputs import files
-    from imgquad_mesh.outputs.report import build_report, element_notes
-    from imgquad_mesh.progress import progress_bar_if
-
-    from .console import announce_compiling, print_report
-
     start = perf_counter()
     writing = writing or Writing()
     marks = Path(options.marks) if isinstance(options.marks, (str, Path)) else None
-    outputs.check(image, marks, *writing.inputs)
+    to.check(image, marks, *writing.inputs)
     if min_quality is not None:
-        MIN_QUALITY.check("min_quality", min_quality)
+        core.measures.MIN_QUALITY.check("min_quality", min_quality)
     if crosscheck:
-        meshlab_filters()  # where pymeshlab is missing, that is said before any work is done
+        meshlab.pymeshlab_filters.meshlab_filters()  # where pymeshlab is missing, that is said before any work is done
     if not quiet:
-        announce_compiling()
+        cli.console.announce_compiling()
     with progress_bar_if(not quiet) as progress:
         run = _run(image, options, progress)
         wrote = perf_counter()
         progress("write", len(run.seconds), len(run.seconds) + 1)
-        made = files.write_run(run, outputs.mesh, writing.elements, **writing.options)
+        made = outputs.write_run(run, to.mesh, writing.elements, **writing.options)
     now = perf_counter()
     seconds = {**run.seconds, "write": now - wrote, "total": now - start}
-    report = build_report(run, image, outputs.mesh, seconds, min_quality)
-    report["notes"] += element_notes(made)
-    _write_others(run, outputs, report)
+    report = outputs.build_report(run, image, to.mesh, seconds, min_quality)
+    report["notes"] += outputs.element_notes(made)
+    _write_others(run, to, report)
     if not quiet:
-        print_report(report)
+        cli.console.print_report(report)
     if crosscheck:
         print_crosscheck(run.mesh, quiet)
     if min_quality is not None:
-        require_quality(run.mesh, min_quality)
+        core.measures.require_quality(run.mesh, min_quality)
     return 0
 
 
-def _run(image: Path, options: MeshOptions, progress: Callable[[str, int, int], None]) -> Run:
-    from imgquad_core.pipeline import run
-    from imgquad_mesh.datasets.vtk_files import EXTENSIONS, read_vtk
-
-    source = read_vtk(image, options.reading()) if image.suffix.lower() in EXTENSIONS else image
-    return run(source, options, progress)
+def _run(image: Path, options: core.MeshOptions, progress: Callable[[str, int, int], None]) -> core.Run:
+    is_vtk = image.suffix.lower() in datasets.VTK_EXTENSIONS
+    source = datasets.read_vtk(image, options.reading()) if is_vtk else image
+    return core.run(source, options, progress)
 
 
-def _write_others(run: Run, outputs: Outputs, report: dict[str, Any]) -> None:
+def _write_others(run: core.Run, to: Outputs, report: dict[str, Any]) -> None:
     """Write all but the mesh, which is there whatever happens now: what is needed most first."""
-    from imgquad_mesh.outputs import files
-
     try:
-        if outputs.report:
-            files.write_json(report, outputs.report)
-        if outputs.picture:
-            files.write_picture(run.mesh, outputs.picture)
-        if outputs.labels:
-            files.write_labels(run.labels, outputs.labels)
-        if outputs.boundaries:
-            files.write_boundaries(run, outputs.boundaries)
-        if outputs.script:
-            _write_script(run.options, outputs.script)
+        if to.report:
+            outputs.write_json(report, to.report)
+        if to.picture:
+            outputs.write_picture(run.mesh, to.picture)
+        if to.labels:
+            outputs.write_labels(run.labels, to.labels)
+        if to.boundaries:
+            outputs.write_boundaries(run, to.boundaries)
+        if to.script:
+            _write_script(run.options, to.script)
     except InputError as error:
-        raise InputError(f"{error} (the mesh is in {outputs.mesh})") from error
+        raise InputError(f"{error} (the mesh is in {to.mesh})") from error
 
 
-def _write_script(options: MeshOptions, path: Path) -> None:
+def _write_script(options: core.MeshOptions, path: Path) -> None:
     """Write a filter script that makes the same mesh of the same picture."""
-    from imgquad_mesh.meshlab.templates import run_as_script
-    from imgquad_mesh.outputs.files import replace_file
-
-    text = run_as_script(options)
-    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    text = meshlab.templates.run_as_script(options)
+    outputs.replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))

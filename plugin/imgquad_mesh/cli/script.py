@@ -6,13 +6,11 @@ import argparse
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import imgquad_core as core
+from imgquad_mesh import meshlab, outputs
 from imgquad_mesh.texts import number
-
-if TYPE_CHECKING:
-    from imgquad_core.model import QuadMesh
-    from imgquad_mesh.meshlab.script import ScriptResult
 
 #: endings of inputs that are meshes; all others are pictures
 MESHES = (
@@ -52,14 +50,11 @@ def add_parser(subparsers: Any) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Run the script that `args` names; return the exit code."""
-    from imgquad_mesh.meshlab.script import run_script
-    from imgquad_mesh.outputs.files import check_files, check_target, write_json
-
     if args.report:
-        check_target(args.report, (".json",))
-        check_files([args.script, args.input], [args.output, args.report])
+        outputs.check_target(args.report, (".json",))
+        outputs.check_files([args.script, args.input], [args.output, args.report])
     is_mesh = args.input is not None and args.input.suffix.lower() in MESHES
-    result = run_script(
+    result = meshlab.script.run_script(
         args.script,
         image=None if is_mesh else args.input,
         mesh=args.input if is_mesh else None,
@@ -70,13 +65,13 @@ def execute(args: argparse.Namespace) -> int:
         progress=None if args.quiet or not sys.stderr.isatty() else _announce,
     )
     if args.report:
-        write_json(report_of(result), args.report)
+        outputs.write_json(report_of(result), args.report)
     if not args.quiet:
         _print(result, args.output)
     return 0
 
 
-def report_of(result: ScriptResult) -> dict[str, Any]:
+def report_of(result: meshlab.script.ScriptResult) -> dict[str, Any]:
     """Return what each filter returned, as JSON can hold it."""
     steps = [
         {"filter": s.name, "function": s.function, "line": s.line, "program": s.program, "seconds": s.seconds,
@@ -86,11 +81,9 @@ def report_of(result: ScriptResult) -> dict[str, Any]:
     return {"steps": steps}
 
 
-def print_crosscheck(mesh: QuadMesh, quiet: bool) -> None:
+def print_crosscheck(mesh: core.QuadMesh, quiet: bool) -> None:
     """Measure a mesh with MeshLab and PyVista, too; QualityError where their figures are others."""
-    from imgquad_mesh.meshlab.crosscheck import crosscheck
-
-    found = crosscheck(mesh)
+    found = meshlab.crosscheck.crosscheck(mesh)
     if not quiet:
         print(found.table)
     found.require(mesh)
@@ -100,7 +93,7 @@ def _announce(name: str, n: int, total: int) -> None:
     print(f"{n + 1}/{total} {name}", file=sys.stderr)
 
 
-def _print(result: ScriptResult, output: Path | None) -> None:
+def _print(result: meshlab.script.ScriptResult, output: Path | None) -> None:
     for step in result.steps:
         print(f"{step.seconds:8.2f} s  {step.name}{_short(step.values)}")
     if result.current is not None:

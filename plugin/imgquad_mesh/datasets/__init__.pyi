@@ -1,15 +1,19 @@
+from .field_texts import for_vtu
 from .fields import MATERIAL_FIELDS, materials_of, put_calibration, put_materials
 from .grids import flattened, from_grid, plain_grid, quads_of, to_fe_grid, to_grid, to_mesh
 from .images import image_array, image_placement, scalars_of, segmented, with_materials
 from .lines import Boundaries, chain_lines, from_lines, to_lines
 from .placement import Placement
+from .vtk_files import VTK_EXTENSIONS, read_vtk, silent_vtk
 
 __all__ = [
     "MATERIAL_FIELDS",
+    "VTK_EXTENSIONS",
     "Boundaries",
     "Placement",
     "chain_lines",
     "flattened",
+    "for_vtu",
     "from_grid",
     "from_lines",
     "image_array",
@@ -19,8 +23,10 @@ __all__ = [
     "put_calibration",
     "put_materials",
     "quads_of",
+    "read_vtk",
     "scalars_of",
     "segmented",
+    "silent_vtk",
     "to_fe_grid",
     "to_grid",
     "to_lines",

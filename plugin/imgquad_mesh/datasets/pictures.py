@@ -19,13 +19,13 @@ from imgquad_core.reading.picture import Picture
 from .field_texts import put_texts
 from .fields import put_calibration, put_materials
 from .images import MATERIAL, OPAQUE, PALETTE, PICTURE, VOID_PIXELS
-from .vtk_files import EXTENSIONS, read_vtk
+from .vtk_files import VTK_EXTENSIONS, read_vtk
 
 
 def read_any(path: str | Path, options: ReadOptions | None = None, name: str | None = None) -> Picture:
     """Read a picture from a file of any format that the command reads; see `imgquad_core.reading.read_picture`."""
     path, options = Path(path), options or ReadOptions()
-    if path.suffix.lower() not in EXTENSIONS:
+    if path.suffix.lower() not in VTK_EXTENSIONS:
         return read_picture(path, options, name)
     with called(path, name):
         found = read_vtk(path, options)

@@ -24,7 +24,7 @@ from .images import MATERIAL, pixel_counts
 from .metaimage import assert_whole
 
 #: extensions of what is read here
-EXTENSIONS = (".vti", ".mha", ".mhd")
+VTK_EXTENSIONS = (".vti", ".mha", ".mhd")
 
 
 @contextmanager

@@ -8,8 +8,7 @@ import numpy as np
 import pyvista as pv
 
 import imgquad_core as core
-from imgquad_mesh import datasets
-from imgquad_mesh.outputs.mesh_picture import material_colors
+from imgquad_mesh import datasets, outputs
 
 #: limits of the colour bar and colour map of each measure
 MEASURES = {
@@ -53,7 +52,7 @@ def _material_style(grid: pv.UnstructuredGrid | pv.PolyData) -> dict[str, Any]:
     numbers = np.asarray(grid.cell_data["material"])
     materials = datasets.materials_of(grid)
     used, index = np.unique(np.searchsorted(materials.labels, numbers), return_inverse=True)
-    colors = material_colors(materials)[used]
+    colors = outputs.material_colors(materials)[used]
     names = {place: materials.names[k] for place, k in enumerate(used[:MOST_IN_LEGEND].tolist())}
     height = min(0.06 * len(used) + 0.06, 0.9)
     return {

@@ -20,6 +20,7 @@ from imgquad_core.geometry.halfedge import components, twins_of
 from imgquad_core.measures.quality import corner_angles, material_areas, quad_areas, scaled_jacobian
 from imgquad_core.model import VOID, QuadMesh
 from imgquad_core.whole_files import scratch_folder
+from imgquad_mesh import datasets
 
 from .meshsets import quad_layer
 from .process import MeshLabProcess
@@ -188,9 +189,7 @@ def _sums(
 
 
 def _with_pyvista(mesh: QuadMesh) -> Iterator[Comparison]:
-    from imgquad_mesh.datasets.grids import to_grid
-
-    measured = to_grid(mesh).cell_quality(["scaled_jacobian", "min_angle", "max_angle", "area"]).cell_data
+    measured = datasets.to_grid(mesh).cell_quality(["scaled_jacobian", "min_angle", "max_angle", "area"]).cell_data
     angles = corner_angles(mesh.points, mesh.quads)
     figures = {
         "scaled Jacobian": (scaled_jacobian(mesh.points, mesh.quads), measured["scaled_jacobian"], 1.0),

@@ -14,6 +14,7 @@ from imgquad_core.whole_files import scratch_folder
 
 from .layer import Layer, layer_of, surface
 from .pymeshlab_filters import MissingMeshLab
+from .worker import add_layer
 
 
 def quad_layer(mesh: QuadMesh, label: str = "quad mesh") -> Layer:
@@ -146,7 +147,7 @@ def from_meshset(meshset: Any, materials: Materials | None = None) -> QuadMesh:
 def new_meshset() -> Any:
     """Return a new ``pymeshlab.MeshSet``; MissingMeshLab where there is no pymeshlab."""
     try:
-        import pymeshlab
+        import pymeshlab  # an extra
     except ImportError as error:
         raise MissingMeshLab(
             f"pymeshlab cannot be imported ({error}); pip install 'imgquad-mesh[meshlab]' and "
@@ -157,7 +158,5 @@ def new_meshset() -> Any:
 
 def add_to(meshset: Any, layer: Layer) -> int:
     """Put a layer into a MeshSet; it becomes the current one. Return its id."""
-    from .worker import add_layer
-
     with scratch_folder() as folder:
         return add_layer(meshset, layer, folder)

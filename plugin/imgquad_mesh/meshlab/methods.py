@@ -13,6 +13,7 @@ from imgquad_core.errors import InputError
 from imgquad_mesh.spec import Filter, filters
 from imgquad_mesh.texts import options_from
 
+from . import worker
 from .layer import Layer, layer_of
 from .meshsets import add_to, new_meshset
 from .own_filters import STEPS
@@ -39,18 +40,14 @@ class MeshSetLayers:
 
     def put(self, layer: Layer) -> int:
         """Put a layer in the place of the current one, return its id."""
-        from .worker import delete_layer
-
         former = int(self._meshset.current_mesh_id())
         mesh = self.add(layer)
-        delete_layer(self._meshset, former)
+        worker.delete_layer(self._meshset, former)
         return mesh
 
     def give(self, do: str, values: NDArray[Any]) -> None:
         """Change the current mesh in place; see `imgquad_mesh.meshlab.worker.give`."""
-        from .worker import give
-
-        give(self._meshset, do, values)
+        worker.give(self._meshset, do, values)
 
     @property
     def layers(self) -> tuple[list[int], int | None]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from imgquad_core.errors import InputError
 from imgquad_core.whole_files import replacing
+from imgquad_mesh import datasets
 from imgquad_mesh.outputs.files import check_target, mesh_extensions, replace_file, write_mesh_file
 
 from .layer import Layer, surface, write_ply
@@ -63,16 +64,14 @@ def _export(process: MeshLabProcess, path: Path) -> None:
 
 def read_grid(path: Path) -> Layer:
     """Read a mesh of quads that PyVista saved; its cell array ``material`` tells the materials."""
-    import pyvista as pv
-
-    from imgquad_mesh.datasets.grids import quads_of
+    import pyvista as pv  # not above: a script that reads no grid starts without it
 
     if not path.is_file():
         raise InputError(f"there is no mesh {path}; give the path of a file")
     grid = pv.read(path)
     if not isinstance(grid, pv.UnstructuredGrid):
         raise InputError(f"mesh {path} is a {type(grid).__name__}; give an UnstructuredGrid of quads")
-    quads = quads_of(grid)
+    quads = datasets.quads_of(grid)
     points = np.asarray(grid.points, np.float64)
     if "material" not in grid.cell_data:
         return surface(points, quads, label=path.name)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
+from imgquad_core import MeshOptions
 from imgquad_core.errors import InputError
 from imgquad_mesh.spec import Filter, Parameter, Value, filters, find_filter
+from imgquad_mesh.texts import values_of
 
 from .mlx import Script, ScriptFilter, ScriptParameter, script_text
 from .names import nearest
-
-if TYPE_CHECKING:
-    from imgquad_core.options import MeshOptions
 
 
 def filter_script(specs: Sequence[Filter], values: Mapping[str, Mapping[str, Value]] | None = None) -> str:
@@ -50,8 +48,6 @@ def _script_parameter(parameter: Parameter, value: Value) -> ScriptParameter:
 
 def run_as_script(options: MeshOptions) -> str:
     """Return the script that does what ``imgquad-mesh run`` does with these options: the same mesh to the bit."""
-    from imgquad_mesh.texts import values_of
-
     spec = filters()["generate_quad_mesh_from_image"]
     return filter_script([spec], {spec.function: values_of(options, spec)})
 

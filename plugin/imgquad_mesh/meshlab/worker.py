@@ -32,7 +32,7 @@ def main() -> None:
     _limit_memory(int(os.environ.get(MEMORY, "0")))
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what pymeshlab prints must not get between the answers
-    import pymeshlab
+    import pymeshlab  # an extra, and prints while it loads
 
     meshes = pymeshlab.MeshSet(False)
     for line in sys.stdin:
@@ -48,8 +48,8 @@ def main() -> None:
 def _limit_memory(n_bytes: int) -> None:
     """Have what needs more fail here, before the machine swaps or ends other processes."""
     try:
-        import resource
-    except ImportError:  # Windows
+        import resource  # there is none on Windows
+    except ImportError:
         return
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     if n_bytes and (hard == resource.RLIM_INFINITY or n_bytes < hard):

@@ -8,20 +8,19 @@ from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
 from time import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from PIL import Image
+from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
+import imgquad_core as core
 from imgquad_core.errors import InputError
 from imgquad_core.whole_files import assert_apart, real_target, replacing, take_room
 from imgquad_core.writers.hdf5_times import erase_times
 from imgquad_core.writers.neighbours import check_neighbours, files_of
-
-if TYPE_CHECKING:
-    from imgquad_core.fe import ElementOptions
-    from imgquad_core.fe.femesh import FEMesh
-    from imgquad_core.model import LabelImage, QuadMesh
-    from imgquad_core.pipeline import Run
+from imgquad_mesh import datasets, outputs  # `outputs`: matplotlib is loaded with the first drawing
 
 #: formats that PyVista writes
 GRID_EXTENSIONS = (".vtu", ".vtk", ".vtkhdf")
@@ -53,18 +52,16 @@ def check_files(inputs: Iterable[Path | None], outputs: Iterable[Path | None]) -
 
 def mesh_extensions() -> tuple[str, ...]:
     """Return the formats that a mesh can be written in."""
-    from imgquad_core.writers import WRITERS
-
-    return (*GRID_EXTENSIONS, *sorted(WRITERS))
+    return (*GRID_EXTENSIONS, *sorted(core.writers.WRITERS))
 
 
-def write_run(run: Run, path: Path, elements: ElementOptions | None = None, **options: Any) -> FEMesh | None:
+def write_run(
+    run: core.Run, path: Path, elements: core.fe.ElementOptions | None = None, **options: Any
+) -> core.fe.FEMesh | None:
     """Write the mesh of a run as `write_mesh_file` does; VTK's formats also hold pixel size, place and CRS."""
 
     def add_place(grid: Any) -> None:
-        from imgquad_mesh.datasets.fields import put_calibration
-
-        put_calibration(grid, run.calibration, (run.options.pixel_sides, run.options.corner))
+        datasets.put_calibration(grid, run.calibration, (run.options.pixel_sides, run.options.corner))
 
     if run.calibration.size is None and (run.options.pixel_sides, run.options.corner) == ((1.0, 1.0), (0.0, 0.0)):
         return write_mesh_file(run.mesh, path, elements, **options)  # pixels are all that is known
@@ -72,12 +69,12 @@ def write_run(run: Run, path: Path, elements: ElementOptions | None = None, **op
 
 
 def write_mesh_file(
-    mesh: QuadMesh,
+    mesh: core.QuadMesh,
     path: Path,
-    elements: ElementOptions | None = None,
+    elements: core.fe.ElementOptions | None = None,
     complete: Callable[[Any], None] | None = None,
     **options: Any,
-) -> FEMesh | None:
+) -> core.fe.FEMesh | None:
     """Write `mesh`, as the `elements` asked for, in the format that the extension of `path` names.
 
     `complete` adds to the grid that VTK writes.
@@ -87,42 +84,30 @@ def write_mesh_file(
     FEMesh or None
         The elements where others than the quads of the mesh were asked for.
     """
-    from imgquad_core.fe import fe_mesh, make_elements
-
-    made = make_elements(mesh, elements) if elements and not elements.plain else None
+    made = core.fe.make_elements(mesh, elements) if elements and not elements.plain else None
     if options.pop("plain", False):
-        _write_plain(made or fe_mesh(mesh), path)
+        _write_plain(made or core.fe.fe_mesh(mesh), path)
     elif path.suffix.lower() in GRID_EXTENSIONS:
-        from imgquad_mesh.datasets.field_texts import for_vtu
-        from imgquad_mesh.datasets.grids import to_fe_grid, to_grid
-
-        grid = to_fe_grid(made) if made else to_grid(mesh)
+        grid = datasets.to_fe_grid(made) if made else datasets.to_grid(mesh)
         if complete:
             complete(grid)
-        saved = for_vtu(grid) if path.suffix.lower() == ".vtu" else grid
+        saved = datasets.for_vtu(grid) if path.suffix.lower() == ".vtu" else grid
         replace_file(path, lambda temporary: save_dataset(saved, temporary))
     else:
-        from imgquad_core.writers import write_mesh
-
-        write_mesh(made or mesh, path, **options)
+        core.writers.write_mesh(made or mesh, path, **options)
     return made
 
 
-def _write_plain(mesh: FEMesh, path: Path) -> None:
+def _write_plain(mesh: core.fe.FEMesh, path: Path) -> None:
     """Write ``.vtu`` or ``.vtk`` (text, 4.2) for other readers than VTK's; numbers of materials in a comment."""
-    from imgquad_core.writers.common import safe_names
-    from imgquad_mesh.datasets.grids import plain_grid
-
-    grid = plain_grid(mesh)
-    names = safe_names([*mesh.material_cells(), *mesh.cohesive_cells()], 255).values()
+    grid = datasets.plain_grid(mesh)
+    names = core.writers.safe_names([*mesh.material_cells(), *mesh.cohesive_cells()], 255).values()
     legend = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
     save = _save_legacy if path.suffix.lower() == ".vtk" else _save_with_comment
     replace_file(path, lambda temporary: save(grid, temporary, legend))
 
 
 def _save_legacy(grid: Any, path: Path, title: str) -> None:
-    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
-
     writer = vtkUnstructuredGridWriter()
     writer.SetFileVersion(42)  # 5.1 is read by VTK only
     writer.SetHeader(title[:LEGACY_TITLE])
@@ -139,27 +124,23 @@ def _save_with_comment(grid: Any, path: Path, comment: str) -> None:
     path.write_text(f"{head}\n<!-- material: {comment} -->\n{body}", encoding="utf-8", newline="\n")
 
 
-def write_labels(image: LabelImage, path: Path) -> None:
+def write_labels(image: core.LabelImage, path: Path) -> None:
     """Write the materials as meshed: int32 array in picture orientation (.npy), or a palette picture (.png)."""
     replace_file(path, lambda temporary: _save_labels(image, temporary))
 
 
-def write_boundaries(run: Run, path: Path) -> None:
+def write_boundaries(run: core.Run, path: Path) -> None:
     """Write the smoothed boundaries as polylines with the materials on their left and right."""
-    from imgquad_mesh.datasets.lines import chain_lines
-
     graph = run.boundary
     materials = np.append(graph.region_label, np.int32(-1))[graph.chain_regions]  # region -1 takes the last one
     points = graph.points * run.square + run.options.corner
-    lines = chain_lines(points, graph.chain_offsets, graph.chain_points, materials, graph.point_kind)
+    lines = datasets.chain_lines(points, graph.chain_offsets, graph.chain_points, materials, graph.point_kind)
     replace_file(path, lambda temporary: save_dataset(lines, temporary))
 
 
-def write_picture(mesh: QuadMesh, path: Path) -> None:
+def write_picture(mesh: core.QuadMesh, path: Path) -> None:
     """Draw the mesh coloured by material."""
-    from .mesh_picture import draw_materials
-
-    replace_file(path, lambda temporary: draw_materials(mesh, temporary))
+    replace_file(path, lambda temporary: outputs.draw_materials(mesh, temporary))
 
 
 def write_json(values: dict[str, Any], path: Path) -> None:
@@ -186,17 +167,13 @@ def save_dataset(dataset: Any, path: Path) -> None:
 
     VTK's HDF5 writer does not tell that a disk is full, so room is made sure of before.
     """
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
-
     writers = {".vtu": vtkXMLUnstructuredGridWriter, ".vtp": vtkXMLPolyDataWriter}
     if path.suffix.lower() == ".vtkhdf":
         arrays = len(dataset.array_names) + 6  # with points, cells
         take_room(path.parent, 1024 * dataset.GetActualMemorySize() + 8 * HDF_CHUNK * arrays)
     if path.suffix.lower() not in writers:
-        from imgquad_mesh.datasets.vtk_files import silent_vtk
-
         start = time()
-        with silent_vtk():
+        with datasets.silent_vtk():
             dataset.save(path)
         if path.suffix.lower() == ".vtkhdf":
             erase_times(path, start, time())
@@ -209,21 +186,17 @@ def save_dataset(dataset: Any, path: Path) -> None:
     path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
 
 
-def _save_labels(image: LabelImage, path: Path) -> None:
+def _save_labels(image: core.LabelImage, path: Path) -> None:
     if path.suffix.lower() == ".npy":
         whole = BytesIO()  # np.save into a file overlooks that a disk is full
         np.save(whole, image.labels)
         path.write_bytes(whole.getbuffer())
         return
-    from PIL import Image
-
-    from .mesh_picture import material_colors
-
     numbers = image.materials.labels
     if image.labels.min() < 0 or numbers.max(initial=0) > 254:
         raise InputError(f"{path}: a palette picture holds the materials 0 to 254, without void; write a .npy instead")
     palette = np.zeros((256, 3), np.uint8)
-    palette[numbers] = np.round(material_colors(image.materials) * 255)
+    palette[numbers] = np.round(outputs.material_colors(image.materials) * 255)
     picture = Image.fromarray(image.labels.astype(np.uint8), mode="P")
     picture.putpalette(palette.ravel().tolist())
     picture.save(path)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib import colormaps, rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from imgquad_core.model import Materials, QuadMesh
+from imgquad_core.model import Materials, QuadMesh
 
 PIXELS = 1600  #: of the longer side
 DISTINCT = 40  #: least difference between the colours of two materials, in one channel
@@ -17,12 +21,6 @@ DISTINCT = 40  #: least difference between the colours of two materials, in one 
 
 def draw_materials(mesh: QuadMesh, path: Path) -> None:
     """Draw the mesh coloured by material, with its edges where they are wide enough to be seen, and a legend."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import PolyCollection
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
-
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     width, height = high - low
     longest = max(width, height)
@@ -50,8 +48,6 @@ def draw_materials(mesh: QuadMesh, path: Path) -> None:
 
 def material_colors(materials: Materials) -> NDArray[np.float64]:
     """Return RGB from 0 to 1 of each material: the picture's own where they can be told apart, else others."""
-    from matplotlib import colormaps
-
     own = materials.colors.astype(int)
     difference = np.abs(own[:, None] - own[None]).max(axis=2)
     np.fill_diagonal(difference, 255)

@@ -8,22 +8,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from imgquad_core.boundary.extraction import extract_boundaries
+from imgquad_core.fe import FEMesh
 from imgquad_core.fe.cohesive import closed_ends
 from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.measures.quality import bad_places, forced_quads, quality_report, scaled_jacobian
 from imgquad_core.mesher import triangulator_used
 from imgquad_core.model import BoundaryGraph, PointKind
-from imgquad_core.pipeline import lost_materials, thin_features
-
-if TYPE_CHECKING:
-    from imgquad_core.fe.femesh import FEMesh
-    from imgquad_core.pipeline import Run
+from imgquad_core.pipeline import Run, lost_materials, thin_features
 
 PACKAGES = ("imgquad-mesh", "numpy", "scipy", "numba", "scikit-image", "triangle", "pythoncdt", "pyvista", "vtk")
 MOST_MATERIALS = 10  #: that lost regions are named
@@ -114,8 +111,8 @@ def versions() -> dict[str, str]:
 def peak_memory_mb() -> float | None:
     """Return the largest amount of memory that this process has used, in MB; `None` where that is not known."""
     try:
-        import resource
-    except ImportError:  # Windows
+        import resource  # there is none on Windows
+    except ImportError:
         return None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return round(peak / (1e6 if sys.platform == "darwin" else 1e3), 1)

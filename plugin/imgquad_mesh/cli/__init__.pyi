@@ -1,0 +1,3 @@
+from . import console, demo, list_filters, rock_picture, run, script
+
+__all__ = ["console", "demo", "list_filters", "rock_picture", "run", "script"]

@@ -1,0 +1,33 @@
+from .files import (
+    GRID_EXTENSIONS,
+    check_files,
+    check_target,
+    mesh_extensions,
+    replace_file,
+    write_boundaries,
+    write_json,
+    write_labels,
+    write_mesh_file,
+    write_picture,
+    write_run,
+)
+from .mesh_picture import draw_materials, material_colors
+from .report import build_report, element_notes
+
+__all__ = [
+    "GRID_EXTENSIONS",
+    "build_report",
+    "check_files",
+    "check_target",
+    "draw_materials",
+    "element_notes",
+    "material_colors",
+    "mesh_extensions",
+    "replace_file",
+    "write_boundaries",
+    "write_json",
+    "write_labels",
+    "write_mesh_file",
+    "write_picture",
+    "write_run",
+]
