@@ -53,6 +53,23 @@ def test_a_circle_has_no_corner(radius: float) -> None:
     assert np.array_equal(found.raw, before.raw)
 
 
+@pytest.mark.parametrize("radius", np.arange(5.0, 12.5, 0.5))
+def test_no_disc_has_a_corner_wherever_it_lies(radius: float) -> None:
+    centres = np.random.default_rng(0).random((60, 2)) + 20.0
+    found = [find_corners(curves(disc(radius, (x, y), 42)))[1].sum() for x, y in centres]
+    assert not any(found)
+
+
+@pytest.mark.parametrize("side", [9.0, 12.0, 17.0, 25.0])
+def test_squares_keep_their_corners_wherever_they_lie(side: float) -> None:
+    rng = np.random.default_rng(1)
+    found = [
+        find_corners(curves(square(side, rng.uniform(0, 90), tuple(rng.random(2) + 25), 50)[0]))[1].sum()
+        for _ in range(25)
+    ]
+    assert np.mean(np.array(found) == 5) >= 0.85  # four, and the first again at the end of the chain
+
+
 def test_the_rounded_tip_of_a_line_is_no_corner() -> None:
     labels = np.zeros((30, 60), np.int32)
     labels[14:16, 10:50] = 1
