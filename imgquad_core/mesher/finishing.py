@@ -5,6 +5,8 @@ Faces share no point, so threads can work on them in batches; large ones are wor
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats
@@ -22,85 +24,86 @@ from .splitting import points_between, split_quads
 from .triangulation import Constraints
 
 FIT_ROUNDS = 6  # in which the rim goes to its places, each as far as no quad folds
-DRAFT, FULL, AGAIN = (3, 0), (8, 6), (3, 6)  # sweeps of Laplace and of Newton: before the clean-up, after it, again
 RETRIED = 6  # quads beside a seam within which the clean-up of a large face looks again
 ROOM = 10  # quads around a place that its cavities can reach
 REACH = 3  # quads beside a seam that are smoothed again
 POOR = 0.7  # scaled Jacobian below which single quads are replaced
 
 
-def finished(
-    batches: list[FaceQuads],
-    targets: Floats,
-    across: int,
-    rim: Constraints,
-    how: CleanUp,
-    threads: int,
-    portions: Portions,
-) -> list[FaceQuads]:
-    """Turn composed quads into the final ones of their faces, batch by batch.
+class Sweeps(NamedTuple):
+    """How often nodes are smoothed, at most."""
 
-    Parameters
-    ----------
-    batches : list of FaceQuads
-        Composed quads, from `batches_of`.
-    targets : float64, shape (n, 2)
-        Where the rim belongs: points of the boundary, by `FaceQuads.origin`.
-    across : int
-        Number of quads, 1, 2 or 3, across each one when it is split after the clean-up.
-    rim : Constraints
-        The rim's edges before that split, with the boundary's points between their ends.
-    how : CleanUp
-        How far the clean-up goes.
-    threads : int
-        Number of threads; the quads do not depend on it.
-    portions : Portions
-        Which faces are large, and how wide their strips are.
-    """
-
-    def whole(part: FaceQuads) -> FaceQuads:
-        part = clean_up(_relaxed(_fitted(part, targets, False), *DRAFT), how)
-        if across > 1:  # smoothed while there are few nodes
-            part = _split(_relaxed(part, *FULL), rim, across)
-        return _without_poor(_relaxed(_fitted(part, targets, True), *last))
-
-    def large(part: FaceQuads) -> FaceQuads:
-        part = _cleaned_in_pieces(_fitted(part, targets, False), how, threads, portions)
-        if across > 1:
-            part = _split(_relaxed_in_pieces(part, *FULL, threads, portions), rim, across)
-        return _relaxed_in_pieces(_fitted(part, targets, True), *last, threads, portions)
-
-    last = FULL if across == 1 else AGAIN
-    small = in_threads([part for part in batches if not is_large(part, portions)], whole, threads)
-    single = [large(part) for part in batches if is_large(part, portions)]
-    return [*small, *in_threads(single, _without_poor, threads)]
+    laplace: int  #: towards the mean of their neighbours
+    newton: int  #: towards the best shape of their quads
 
 
-def _split(part: FaceQuads, rim: Constraints, across: int) -> FaceQuads:
+DRAFT, FULL, AGAIN = Sweeps(3, 0), Sweeps(8, 6), Sweeps(3, 6)  # before the clean-up, after it, again
+
+
+class Task(NamedTuple):
+    """What is asked of `finished`."""
+
+    targets: Floats  #: (n, 2) where the rim belongs: points of the boundary, by `FaceQuads.origin`
+    across: int  #: number of quads, 1, 2 or 3, across each one when it is split after the clean-up
+    rim: Constraints  #: the rim's edges before that split, with the boundary's points between their ends
+    how: CleanUp  #: how far the clean-up goes
+    threads: int  #: the quads do not depend on it
+    portions: Portions  #: which faces are large, and how wide their strips are
+
+    @property
+    def last(self) -> Sweeps:
+        """Those at the end: nodes of split quads were smoothed before, while there were few."""
+        return FULL if self.across == 1 else AGAIN
+
+
+def finished(batches: list[FaceQuads], task: Task) -> list[FaceQuads]:
+    """Turn composed quads, from `batches_of`, into the final ones of their faces, batch by batch."""
+    small = [part for part in batches if not is_large(part, task.portions)]
+    whole = in_threads(small, lambda part: _without_poor(_finished_whole(part, task)), task.threads)
+    single = [_finished_in_pieces(part, task) for part in batches if is_large(part, task.portions)]
+    return [*whole, *in_threads(single, _without_poor, task.threads)]
+
+
+def _finished_whole(part: FaceQuads, task: Task) -> FaceQuads:
+    part = clean_up(_relaxed(_fitted(part, task.targets, False), DRAFT), task.how)
+    if task.across > 1:
+        part = _split(_relaxed(part, FULL), task)
+    return _relaxed(_fitted(part, task.targets, True), task.last)
+
+
+def _finished_in_pieces(part: FaceQuads, task: Task) -> FaceQuads:
+    part = _cleaned_in_pieces(_fitted(part, task.targets, False), task)
+    if task.across > 1:
+        part = _split(_relaxed_in_pieces(part, FULL, task), task)
+    return _relaxed_in_pieces(_fitted(part, task.targets, True), task.last, task)
+
+
+def _split(part: FaceQuads, task: Task) -> FaceQuads:
     """Split every quad into four or nine."""
     twins = twins_of(part.quads, len(part.points))
-    return split_quads(part, twins, points_between(part.quads, twins, part.origin, rim, across))
+    return split_quads(part, twins, points_between(part.quads, twins, part.origin, task.rim, task.across))
 
 
-def _cleaned_in_pieces(face: FaceQuads, how: CleanUp, threads: int, portions: Portions) -> FaceQuads:
+def _cleaned_in_pieces(face: FaceQuads, task: Task) -> FaceQuads:
     """Smooth and clean up one large face in strips, then in bands around the seams."""
+    how, portions = task.how, task.portions
     strip = strips_of(face.points, face.quads, portions)
-    face, seams = in_pieces(face, strip, lambda part, _: clean_up(_relaxed(part, *DRAFT), how), threads)
+    face, seams = in_pieces(face, strip, lambda part, _: clean_up(_relaxed(part, DRAFT), how), task.threads)
     near = nodes_around(face.quads, seams, RETRIED)
     in_band = nodes_around(face.quads, near, ROOM)[face.quads].any(axis=1)
     band = np.where(in_band, strips_of(face.points, face.quads, portions, shifted=True), LEFT_ALONE)
-    return in_pieces(face, band, lambda part, ids: clean_up(_relaxed(part, *DRAFT), how, near[ids]), threads)[0]
+    return in_pieces(face, band, lambda part, ids: clean_up(_relaxed(part, DRAFT), how, near[ids]), task.threads)[0]
 
 
-def _relaxed_in_pieces(
-    face: FaceQuads, laplace_sweeps: int, newton_sweeps: int, threads: int, portions: Portions
-) -> FaceQuads:
+def _relaxed_in_pieces(face: FaceQuads, sweeps: Sweeps, task: Task) -> FaceQuads:
     """Smooth the nodes inside one large face in strips, then those around the seams."""
     points, rings, free = face.points.copy(), rings_of(face.quads, len(face.points)), face.origin < 0
-    groups, seams = independent_nodes(strips_of(points, face.quads, portions), face.quads, len(points), threads)
+    groups, seams = independent_nodes(
+        strips_of(points, face.quads, task.portions), face.quads, len(points), task.threads
+    )
     near = nodes_around(face.quads, seams, REACH)
-    in_threads(groups, lambda nodes: _relax(points, rings, free & nodes, laplace_sweeps, newton_sweeps), threads)
-    _relax(points, rings, free & near, laplace_sweeps, newton_sweeps)
+    in_threads(groups, lambda nodes: _relax(points, rings, free & nodes, sweeps), task.threads)
+    _relax(points, rings, free & near, sweeps)
     return face._replace(points=points)
 
 
@@ -115,20 +118,20 @@ def _fitted(part: FaceQuads, targets: Floats, whole: bool) -> FaceQuads:
     return part._replace(points=points, wanted=wanted)
 
 
-def _relaxed(part: FaceQuads, laplace_sweeps: int, newton_sweeps: int, only: Flags | None = None) -> FaceQuads:
+def _relaxed(part: FaceQuads, sweeps: Sweeps, only: Flags | None = None) -> FaceQuads:
     """Smooth the nodes inside faces, all or some."""
     points, free = part.points.copy(), part.origin < 0
     if only is not None:
         free &= only
-    _relax(points, rings_of(part.quads, len(points)), free, laplace_sweeps, newton_sweeps)
+    _relax(points, rings_of(part.quads, len(points)), free, sweeps)
     return part._replace(points=points)
 
 
-def _relax(points: Floats, rings: Rings, free: Flags, laplace_sweeps: int, newton_sweeps: int) -> None:
+def _relax(points: Floats, rings: Rings, free: Flags, sweeps: Sweeps) -> None:
     """Smooth free nodes, in place."""
-    laplace(points, rings, free, laplace_sweeps)
+    laplace(points, rings, free, sweeps.laplace)
     untangle(points, rings, free, 2, BAD)
-    newton(points, rings, free, newton_sweeps, GOOD)
+    newton(points, rings, free, sweeps.newton, GOOD)
 
 
 def _without_poor(part: FaceQuads) -> FaceQuads:
@@ -142,4 +145,4 @@ def _without_poor(part: FaceQuads) -> FaceQuads:
 
 def _repaired(part: FaceQuads) -> FaceQuads:
     better, beside = repair(part, POOR)
-    return _relaxed(better, *AGAIN, beside)
+    return _relaxed(better, AGAIN, beside)

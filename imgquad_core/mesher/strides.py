@@ -23,7 +23,7 @@ from .composing import compose
 from .crossfield import cross_field
 from .cutting import CutMesh, FaceConflict, cut_at_constraints
 from .efforts import EFFORTS
-from .finishing import finished
+from .finishing import Task, finished
 from .frontal import frontal_points
 from .options import MeshingOptions
 from .outline import Outline, chains_in_conflict, chains_of, coarse_segments, mean_edges, outline, wide_faces
@@ -129,7 +129,7 @@ def _mesh_at_stride(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanU
     nothing = np.zeros(len(rim.tail), np.int64)
     table = constraint_table(len(graph.points), rim.tail, rim.head, nothing, nothing, rim.middle)
     batches = [batch for group in composed for batch in group]
-    parts = finished(batches, graph.points, stride // 2, table, how, options.threads, portions)
+    parts = finished(batches, Task(graph.points, stride // 2, table, how, options.threads, portions))
     in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.threads)
     return Meshed(parts, faces, worst)
 

@@ -360,30 +360,27 @@ def rounded(labels: Labels, changed: Flags, stays: Flags, reach: float, width: f
 def _widened(flags: Flags, reach: int) -> Flags:
     """Flag the squares around flagged pixels."""
     rows, cols = flags.shape
-    along, wide = np.zeros((rows, cols), np.bool_), np.zeros((rows, cols), np.bool_)
+    flat, along, wide = flags.ravel(), np.zeros(rows * cols, np.bool_), np.zeros(rows * cols, np.bool_)
     for i in range(rows):
-        last = -(reach + 1)
-        for j in range(cols):
-            if flags[i, j]:
-                last = j
-            along[i, j] = j - last <= reach
-        last = cols + reach + 1
-        for j in range(cols - 1, -1, -1):
-            if flags[i, j]:
-                last = j
-            along[i, j] |= last - j <= reach
+        _widen_line(flat, i * cols, 1, cols, reach, along)
     for j in range(cols):
-        last = -(reach + 1)
-        for i in range(rows):
-            if along[i, j]:
-                last = i
-            wide[i, j] = i - last <= reach
-        last = rows + reach + 1
-        for i in range(rows - 1, -1, -1):
-            if along[i, j]:
-                last = i
-            wide[i, j] |= last - i <= reach
-    return wide
+        _widen_line(along, j, cols, rows, reach, wide)
+    return wide.reshape(rows, cols)
+
+
+@verb
+def _widen_line(flags: Flags, first: int, step: int, n: int, reach: int, out: Flags) -> None:
+    """Flag what is within `reach` of a flagged one, among the n pixels from `first` on, `step` apart."""
+    last = -(reach + 1)
+    for k in range(n):
+        if flags[first + k * step]:
+            last = k
+        out[first + k * step] = k - last <= reach
+    last = n + reach + 1
+    for k in range(n - 1, -1, -1):
+        if flags[first + k * step]:
+            last = k
+        out[first + k * step] |= last - k <= reach
 
 
 @verb
