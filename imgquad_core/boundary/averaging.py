@@ -41,7 +41,8 @@ _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are
 _ENDS = 3.0  # deviations to either side
 _EVERY = 0.75  # of the width, from sample to sample along the stairs
 _NARROWEST = 1.0  # data points; places that need less keep their pixels
-_OF_FREE = 0.5  # width over the distance to foreign parts
+_OF_FREE = 0.5  # width over the distance to foreign parts, at most
+_OF_REGION = 0.5  # and over the root of the area of regions beside it
 _WIDENS = 0.5  # of the width, a unit of length along the chain
 _ROOM = 0.49  # of the distance to foreign parts: two points that both go that far do not meet
 _ARC_RATIO = 2.0  # arc over distance of a foreign point
@@ -68,11 +69,8 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
     curves, ends = curves_of(*chains)
     free = local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
     room = _ROOM * free
-    is_tiny = (curves.ends[:, 0] < 0) & (np.diff(curves.offsets) <= _SHORTEST_LOOP)
-    scale = np.where(per_point(curves, is_tiny), 0.0, np.minimum(width, _OF_FREE * free))
-    scale[scale < _NARROWEST] = 0.0
-    scale = grade_along(scale, curves.arc, curves.offsets, curves.ends, _WIDENS)
-    new = np.ones(len(is_tiny), bool)
+    scale = _graded(curves, np.minimum(_widest(chains.graph, curves, width), _OF_FREE * free))
+    new = np.ones(len(curves.ends), bool)
     for attempt in range(_ROUNDS + 2):
         at, offsets = _places(curves, scale)
         graph = _graph(chains.graph, curves, ends, _points(curves, room, scale, at), offsets, width, units)
@@ -82,11 +80,23 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
             bad = per_point(curves, np.logical_or.reduceat(bad, curves.offsets[:-1])) | (attempt > _ROUNDS)
         if not bad.any():
             break
-        narrower = np.where(bad, 0.0 if attempt >= _ROUNDS else 0.5, 1.0) * scale
-        narrower[narrower < _NARROWEST] = 0.0
-        narrower = grade_along(narrower, curves.arc, curves.offsets, curves.ends, _WIDENS)
+        narrower = _graded(curves, np.where(bad, 0.0 if attempt >= _ROUNDS else 0.5, 1.0) * scale)
         new, scale = np.logical_or.reduceat(narrower < scale, curves.offsets[:-1]), narrower
-    return PixelChains(graph, _sides(offsets, curves.ends[:, 0] >= 0))
+    return PixelChains(graph, *_details(chains.side, curves, scale, at, offsets, width))
+
+
+def _widest(graph: BoundaryGraph, curves: Curves, width: float) -> Floats:
+    """Width at each point as the regions on both sides allow: tiny ones would collapse."""
+    across = np.append(np.sqrt(np.maximum(enclosed_areas(graph), 0.0)), np.inf)  # VOID is the last entry
+    widest = np.minimum(width, _OF_REGION * across[graph.chain_regions].min(axis=1))
+    widest[(curves.ends[:, 0] < 0) & (np.diff(curves.offsets) <= _SHORTEST_LOOP)] = 0.0
+    return per_point(curves, widest)
+
+
+def _graded(curves: Curves, scale: Floats) -> Floats:
+    """Let widths grow along chains as they may, from 0 where there are pixels."""
+    from_pixels = np.where(scale < _NARROWEST, 0.0, scale)
+    return grade_along(from_pixels, curves.arc, curves.offsets, curves.ends, _WIDENS)
 
 
 def _graph(
@@ -105,10 +115,14 @@ def _graph(
     return replace(graph, points=points, point_kind=kind, chain_offsets=offsets, chain_points=ids, shape=shape)
 
 
-def _sides(offsets: Ints, is_open: Flags) -> Ints:
-    side = np.full(offsets[-1], ELSEWHERE)
-    side[offsets[:-1][is_open]] = side[offsets[1:][is_open] - 1] = PIXEL_CORNER
-    return side
+def _details(side: Ints, curves: Curves, scale: Floats, at: Floats, offsets: Ints, width: float) -> tuple[Ints, Floats]:
+    """Tell what the samples are, and how wide what smoothing takes for stairs is there, in widths."""
+    place = at.astype(np.int64)
+    is_pixel = scale[place] < _NARROWEST
+    made = np.where(is_pixel, side[place], ELSEWHERE)
+    is_open = curves.ends[:, 0] >= 0
+    made[offsets[:-1][is_open]] = made[offsets[1:][is_open] - 1] = PIXEL_CORNER
+    return made, np.maximum(np.interp(at, np.arange(len(scale)), scale), _NARROWEST) / width
 
 
 def _astray(curves: Curves, room: Floats, at: Floats, graph: BoundaryGraph, width: float) -> Flags:

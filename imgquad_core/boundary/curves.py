@@ -21,6 +21,7 @@ class PixelChains(NamedTuple):
 
     graph: BoundaryGraph
     side: Ints  #: (n,) one of the above for each place of `graph.chain_points`
+    scale: Floats | None = None  #: (n,) width of what smoothing takes for stairs there, a unit of length; 1 for None
 
 
 def pixel_chains(graph: BoundaryGraph) -> PixelChains:
@@ -46,6 +47,7 @@ class Curves(NamedTuple):
     offsets: Ints  #: (n_chains + 1,)
     ends: Ints  #: (n_chains, 2) node at either end; -1 closed
     is_frame: Flags  #: (n_chains,) lies on the picture's border
+    scale: Floats  #: (n,) width of what smoothing takes for stairs, a unit of length
 
 
 class Ends(NamedTuple):
@@ -57,7 +59,7 @@ class Ends(NamedTuple):
     sockets: Ints  #: 2 * chain + 0 for its start or 1 for its end
 
 
-def curves_of(graph: BoundaryGraph, side: Ints | None = None) -> tuple[Curves, Ends]:
+def curves_of(graph: BoundaryGraph, side: Ints | None = None, scale: Floats | None = None) -> tuple[Curves, Ends]:
     """Unpack a pixel boundary; `side` tells what its points are where coordinates do not, see `PixelChains`."""
     side = pixel_chains(graph).side if side is None else side
     raw = graph.points[graph.chain_points]
@@ -77,6 +79,7 @@ def curves_of(graph: BoundaryGraph, side: Ints | None = None) -> tuple[Curves, E
         np.array(graph.chain_offsets),
         ends,
         (graph.point_kind[second] == PointKind.FRAME) | _along_border(graph, first, second, last),
+        np.ones(len(raw)) if scale is None else scale,
     )
     return curves, Ends(
         graph.points[nodes],
@@ -218,4 +221,5 @@ def started_at(curves: Curves, flags: Flags) -> tuple[Curves, Flags]:
     within = np.arange(len(flags)) - per_point(curves, first)
     order = per_point(curves, first) + (within + per_point(curves, by)) % period
     raw = curves.raw[order]
-    return curves._replace(raw=raw, arc=arc_lengths(raw, curves.offsets), weight=curves.weight[order]), flags[order]
+    turned = curves._replace(raw=raw, arc=arc_lengths(raw, curves.offsets), weight=curves.weight[order])
+    return turned._replace(scale=curves.scale[order]), flags[order]

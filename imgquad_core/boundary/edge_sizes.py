@@ -33,7 +33,6 @@ def edge_sizes(
     growth: float,
     edge_ratio: float,
     shape: tuple[float, float],
-    data_point: float = 1.0,
 ) -> Floats:
     """Wanted length of final edges at each dense point.
 
@@ -51,8 +50,6 @@ def edge_sizes(
         Largest ratio of neighbouring elements, and of neighbouring edges of a chain.
     shape : tuple of float
         (n_rows, n_cols) of the picture.
-    data_point : float
-        Its data points' width: thin places may be as thin.
 
     Returns
     -------
@@ -62,8 +59,8 @@ def edge_sizes(
     reach = min(float(limit.max()) / _ACROSS, float(np.hypot(*shape)))
     lfs = local_feature_size(points, curves, reach, _BEND)
     size = np.minimum(limit, _ACROSS * lfs)
-    _limit_turn(points, curves.offsets, curves.arc, np.cumsum(is_corner), size)
-    size = np.minimum(np.maximum(size, _FINEST * data_point), limit)
+    _limit_turn(points, curves, np.cumsum(is_corner), size)
+    size = np.minimum(np.maximum(size, _FINEST * curves.scale), limit)
     return grade(size, points, curves, growth, edge_ratio, shape)
 
 
@@ -92,15 +89,16 @@ def grade_chains(size: Floats, curves: Curves, n_nodes: int, edge_ratio: float) 
 
 
 @kernel
-def _limit_turn(points: Floats, offsets: Ints, arc: Floats, corners: Ints, size: Floats) -> None:
+def _limit_turn(points: Floats, curves: Curves, corners: Ints, size: Floats) -> None:
     """`corners` counts the corners up to each point."""
+    offsets, arc, scale = curves.offsets, curves.arc, curves.scale
     for c in range(len(offsets) - 1):
         first, last = offsets[c], offsets[c + 1] - 1
         back = ahead = first
         for i in range(first + 1, last):
-            while arc[i] - arc[back] > _OVER:
+            while arc[i] - arc[back] > _OVER * scale[i]:
                 back += 1
-            while ahead < last and arc[ahead] - arc[i] < _OVER:
+            while ahead < last and arc[ahead] - arc[i] < _OVER * scale[i]:
                 ahead += 1
             if corners[ahead] > corners[max(back - 1, 0)]:
                 continue
@@ -109,7 +107,7 @@ def _limit_turn(points: Floats, offsets: Ints, arc: Floats, corners: Ints, size:
             turn = abs(np.arctan2(ux * vy - uy * vx, ux * vx + uy * vy))
             apart = 0.5 * (np.hypot(ux, uy) + np.hypot(vx, vy))
             if turn * size[i] > _TURN * apart:
-                size[i] = max(_TURN * apart / turn, min(size[i], _FINEST_BEND))
+                size[i] = max(_TURN * apart / turn, min(size[i], _FINEST_BEND * scale[i]))
 
 
 def _grade_plane(size: Floats, points: Floats, slope: float, raster: NDArray[np.float32]) -> Floats:

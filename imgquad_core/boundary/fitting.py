@@ -151,19 +151,21 @@ def _quartic_at(samples: Samples, i: int, w: float, a: Floats) -> tuple[float, f
 
 
 @verb
-def _choose_windows(samples: Samples, first: int, last: int, widest: float, windows: Floats, w: Floats) -> None:
-    """Half width of the window at points first..last of a piece, into w."""
+def _choose_windows(samples: Samples, first: int, scale: Floats, widest: float, windows: Floats, w: Floats) -> None:
+    """Half width of the window at the points of a piece, which begins at `first` and has these scales, into w."""
     s, sums = samples.arc, np.empty(14)
+    last = first + len(scale) - 1
     for k in range(first, last + _EVERY, _EVERY):
         i = min(k, last)
-        w[i] = min(windows[0], widest)
+        unit = scale[i - first]
+        w[i] = min(windows[0] * unit, widest)
         failures = 0
         for candidate in windows:
-            if candidate > widest or (candidate > _DARING and failures > 1):
+            if candidate * unit > widest or (candidate > _DARING and failures > 1):
                 break
-            _, _, rms = quadratic_at(samples, i, candidate, sums)
-            if rms <= STAIR_NOISE:
-                w[i] = candidate
+            _, _, rms = quadratic_at(samples, i, candidate * unit, sums)
+            if rms <= STAIR_NOISE * unit:
+                w[i] = candidate * unit
                 failures = 0
             else:
                 failures += 1
@@ -189,11 +191,13 @@ def _put_quadratics(samples: Samples, at: int, width: Floats, closed: bool, piec
 
 
 @verb
-def _put_quartics(samples: Samples, at: int, width: Floats, closed: bool, piece: Floats, matrix: Floats) -> None:
+def _put_quartics(
+    samples: Samples, at: int, width: Floats, scale: Floats, closed: bool, piece: Floats, matrix: Floats
+) -> None:
     """Move the points of a piece on to the values of quartics, where windows are wide."""
     n = len(piece) - 1
     for j in range(0 if closed else 1, n):
-        share = min((width[j] - _DETAIL) / (_WIDE - _DETAIL), 1.0)
+        share = min((width[j] / scale[j] - _DETAIL) / (_WIDE - _DETAIL), 1.0)
         if share > 0.0:
             dx, dy = _quartic_at(samples, at + j, _WIDER * width[j], matrix)
             piece[j, 0] += share * (samples.x[at + j] + dx - piece[j, 0])
@@ -235,7 +239,9 @@ def _extend(chain: Samples, first: int, last: int, closed: bool, reach: float, o
 
 
 @kernel
-def fit_pieces(points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed: Flags, windows: Floats) -> Floats:
+def fit_pieces(
+    points: Floats, arc: Floats, weight: Floats, scale: Floats, pieces: Ints, closed: Flags, windows: Floats
+) -> Floats:
     """Smooth pieces of chains by local quadratics and, where windows are wide, quartics.
 
     Parameters
@@ -246,6 +252,8 @@ def fit_pieces(points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed
         Length along the pixel boundary.
     weight : float64, shape (n,)
         How well each point is known.
+    scale : float64, shape (n,)
+        Width of stairs at each point: windows and noise are in these.
     pieces : int64, shape (k, 2)
         First and last point of each piece.
     closed : bool, shape (k,)
@@ -277,11 +285,11 @@ def fit_pieces(points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed
         if (closed[k] and n < _SHORTEST_LOOP) or widest < 1.0:
             continue
         at = _extend(Samples(x, y, arc, weight), first, last, closed[k], widest, samples)
-        _choose_windows(samples, at, at + n, widest, windows, w)
+        _choose_windows(samples, at, scale[first : last + 1], widest, windows, w)
         widest_chosen = 0.0
         for j in range(n + 1):
             width[j] = w[at + j]
-            widest_chosen = max(widest_chosen, width[j])
+            widest_chosen = max(widest_chosen, width[j] / scale[first + j])
         piece = fitted[first : last + 1]
         _put_quadratics(samples, at, width, closed[k], piece, sums)
         if widest_chosen > _DETAIL:
@@ -290,5 +298,5 @@ def fit_pieces(points: Floats, arc: Floats, weight: Floats, pieces: Ints, closed
                 step = np.hypot(piece[j + 1, 0] - piece[j, 0], piece[j + 1, 1] - piece[j, 1])
                 true_arc[first + j + 1] = true_arc[first + j] + step
             at = _extend(Samples(x, y, true_arc, weight), first, last, closed[k], _WIDER * widest, samples)
-            _put_quartics(samples, at, width, closed[k], piece, matrix)
+            _put_quartics(samples, at, width, scale[first : last + 1], closed[k], piece, matrix)
     return fitted

@@ -109,15 +109,16 @@ def _bearing(curves: Curves, socket: int, dx: float, dy: float) -> float:
 
 @verb
 def _limit(curves: Curves, nodes: Ends, room: Floats, v: int) -> float:
-    limit = _FARTHEST
+    limit = np.inf
     for k in range(nodes.offsets[v], nodes.offsets[v + 1]):
         socket = nodes.sockets[k]
         c = socket // 2
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
-        limit = min(limit, _ROOM * curves.arc[last])
         end, step = (last, -1) if socket % 2 else (first, 1)
+        unit = curves.scale[end]
+        limit = min(limit, _ROOM * curves.arc[last], _FARTHEST * unit)
         i = end
-        while first <= i <= last and abs(curves.arc[i] - curves.arc[end]) <= _BESIDE:
+        while first <= i <= last and abs(curves.arc[i] - curves.arc[end]) <= _BESIDE * unit:
             limit = min(limit, room[i])
             i += step
     return limit
@@ -135,7 +136,9 @@ def _meet(curves: Curves, nodes: Ends, v: int) -> tuple[float, float]:
     a, b, d, p, q = _PULL, 0.0, _PULL, 0.0, 0.0
     for k in range(nodes.offsets[v], nodes.offsets[v + 1]):
         socket = nodes.sockets[k]
-        n, x, y, tx, ty, _ = line_beside(curves, socket // 2, _end(curves, socket), 1 - 2 * (socket % 2), _NEAR, _FAR)
+        end = _end(curves, socket)
+        near, far = _NEAR * curves.scale[end], _FAR * curves.scale[end]
+        n, x, y, tx, ty, _ = line_beside(curves, socket // 2, end, 1 - 2 * (socket % 2), near, far)
         if n < 3:
             continue
         off = tx * y - ty * x

@@ -28,6 +28,7 @@ _UNROUND = 0.289  # px, least residual (rms) of one circle through short sides: 
 _LONG = 12.0  # px; no circle is straight over two sides of this length and turns by `_TURN`
 _FARTHEST = 2.0  # px from the pixel boundary
 _APART = 4.2  # px of arc between corners
+_WHOLE = 0.999  # least scale of a corner: where details are finer sides are too short to tell
 _BESIDE = 12  # samples on each side of a point of a closed chain
 _ROUND = 2 * _BESIDE + 2
 _AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
@@ -48,7 +49,7 @@ def find_corners(curves: Curves) -> tuple[Curves, Flags]:
     is_corner : bool, shape (n,)
         Dense points that are corners; where a closed chain starts at one, its last point too.
     """
-    return started_at(curves, _find(curves, _SIDES))
+    return started_at(curves, _find(curves, _SIDES) & (curves.scale >= _WHOLE))
 
 
 def place_corners(curves: Curves, is_corner: Flags, room: Floats, points: Floats) -> None:

@@ -65,7 +65,7 @@ def smooth_boundaries(
     true = _TrueShape.of(graph.shape, shape, step)
     pores = pores_of(graph)
     chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step)
-    width = max(0.5 * options.tolerance / true.unit, 1.0)
+    width = 0.5 * options.tolerance / true.unit
     if width > 1.0:
         chains = averaged(chains, width, UNITS * np.array(step))
         true = _TrueShape.of(graph.shape, shape, (step[0] * width, step[1] * width))
@@ -88,9 +88,8 @@ def smooth_boundaries(
         options.edge_multiple,
         true.extent,
         true.grid,
-        1.0 / width,
     )
-    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent, 1.0 / width)
+    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent)
     nodes, gently = place_freely(draft, size)
     areas = np.append(graph.region_pixels, pores.pixels) * true.pixel
     sides = pores.sides[which]
@@ -150,7 +149,7 @@ def _room(curves: Curves, is_corner: Flags, max_shift: float) -> Floats:
     reach = max(_NARROW, max_shift / _ROOM)
     corner = beside_corners(curves, is_corner)
     free = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO, corner)
-    return np.asarray(np.minimum(free, np.where(is_corner, 1.0, _SHARE) * max_shift))
+    return np.asarray(np.minimum(free, np.where(is_corner, 1.0, _SHARE) * max_shift * curves.scale))
 
 
 def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats) -> Floats:
@@ -159,7 +158,7 @@ def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats) -> Flo
     place_corners(curves, is_corner, room, pinned)
     pin_ends(pinned, curves, node)
     pieces, closed = _pieces(curves, is_corner)
-    fitted = fit_pieces(pinned, curves.arc, curves.weight, pieces, closed, np.array(WINDOWS))
+    fitted = fit_pieces(pinned, curves.arc, curves.weight, curves.scale, pieces, closed, np.array(WINDOWS))
     shift = fitted - curves.raw
     length = np.hypot(shift[:, 0], shift[:, 1])
     smooth: Floats = curves.raw + shift * np.minimum(1.0, room / np.maximum(length, 1e-300))[:, None]

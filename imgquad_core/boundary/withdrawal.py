@@ -56,7 +56,6 @@ class Draft(NamedTuple):
     edge_multiple: int  #: very long pieces get a multiple of this many final edges
     shape: tuple[float, float]
     units: float = UNITS  #: steps of the grid on which coordinates are exact, a unit of length
-    data_point: float = 1.0  #: width of the picture's data points
 
 
 def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> tuple[Nodes, bool]:
@@ -94,7 +93,7 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         failed = any_of_chain(factor < 1.0, curves.offsets)
         if attempt >= patience.curved:
             exact |= failed | (attempt >= patience.most)
-        shorter = np.maximum(size * factor, np.minimum(_CLOSEST * draft.data_point, draft.limit))
+        shorter = np.maximum(size * factor, np.minimum(_CLOSEST * curves.scale, draft.limit))
         shorter = grade_chains(shorter, curves, len(draft.node), draft.edge_ratio)
         failed |= any_of_chain(shorter < size, curves.offsets)
         size, withdrawn = shorter, np.where(per_point(curves, exact), 1.0, np.minimum(withdrawn + pull, 1.0))
@@ -204,7 +203,8 @@ def _area_bounds(curves: Curves, nodes: Nodes, room: Floats, max_shift: float) -
     """How far the segments at each node may be shifted: little beside nodes that stay, so that no kink arises."""
     offsets, at = nodes.placed.offsets, nodes.placed.at
     gone = np.hypot(*(nodes.points[nodes.chain_points] - points_at(curves.raw, at)).T)
-    bound = np.minimum(max_shift - gone, _AREA_ROOM * room[at.astype(np.int64)])
+    place = at.astype(np.int64)
+    bound = np.minimum(max_shift * curves.scale[place] - gone, _AREA_ROOM * room[place])
     places = places_of(nodes.chain_points, offsets)
     bound[places.at] /= np.maximum(np.hypot(*mitres(nodes.points, places).T), 1.0)
     stays = np.repeat(curves.is_frame, np.diff(offsets))

@@ -69,7 +69,15 @@ def circle(radius: float) -> Curves:
     raw = np.stack([40 + radius * np.cos(t), 40 + radius * np.sin(t)], axis=1)
     raw[-1] = raw[0]
     offsets = np.array([0, len(raw)])
-    return Curves(raw, arc_lengths(raw, offsets), np.ones(len(raw)), offsets, np.array([[-1, -1]]), np.zeros(1, bool))
+    return Curves(
+        raw,
+        arc_lengths(raw, offsets),
+        np.ones(len(raw)),
+        offsets,
+        np.array([[-1, -1]]),
+        np.zeros(1, bool),
+        np.ones(len(raw)),
+    )
 
 
 @pytest.mark.parametrize("radius", [4.0, 7.0, 20.0])
@@ -86,7 +94,15 @@ def test_a_corner_is_no_bend() -> None:
         np.stack([10 + side, np.full(40, 10.0)], axis=1), np.stack([np.full(41, 30.0), 10 + np.r_[side, 20]], axis=1)
     ]
     offsets = np.array([0, len(raw)])
-    c = Curves(raw, arc_lengths(raw, offsets), np.ones(len(raw)), offsets, np.array([[0, 1]]), np.zeros(1, bool))
+    c = Curves(
+        raw,
+        arc_lengths(raw, offsets),
+        np.ones(len(raw)),
+        offsets,
+        np.array([[0, 1]]),
+        np.zeros(1, bool),
+        np.ones(len(raw)),
+    )
     sizes = [
         edge_sizes(raw, c, np.full(len(raw), 4.0), np.arange(len(raw)) == corner, 1.3, 1.2, (50, 50))
         for corner in (40, -1)

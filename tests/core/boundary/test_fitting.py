@@ -18,7 +18,9 @@ def arc_of(points: Floats) -> Floats:
 
 def fitted(points: Floats, weight: Floats, windows: tuple[float, ...] = WINDOWS, closed: bool = False) -> Floats:
     piece = np.array([[0, len(points) - 1]])
-    return fit_pieces(points, arc_of(points), weight, piece, np.array([closed]), np.array(windows))
+    return fit_pieces(
+        points, arc_of(points), weight, np.ones(len(points)), piece, np.array([closed]), np.array(windows)
+    )
 
 
 def quadratic_value(points: Floats, weight: Floats, i: int, w: float) -> Floats:
@@ -81,6 +83,12 @@ def test_a_loop_of_a_few_points_and_points_on_no_piece_stay() -> None:
     assert np.array_equal(fitted(loop, np.ones(10), closed=True), loop)
     points = np.random.default_rng(0).random((40, 2)) * 30
     none = fit_pieces(
-        points, arc_of(points), np.ones(40), np.empty((0, 2), np.int64), np.empty(0, bool), np.array(WINDOWS)
+        points,
+        arc_of(points),
+        np.ones(40),
+        np.ones(40),
+        np.empty((0, 2), np.int64),
+        np.empty(0, bool),
+        np.array(WINDOWS),
     )
     assert np.array_equal(none, points)

@@ -27,7 +27,9 @@ def star(angles: Floats, off: Floats, shape: tuple[int, int] = (60, 60)) -> tupl
     place = np.vstack([[30.0, 30.0], raw[offsets[1:] - 1]])
     kind = np.full(n + 1, PointKind.CORNER, np.uint8)
     kind[0] = PointKind.JUNCTION
-    curves = Curves(raw, arc_lengths(raw, offsets), np.ones(len(raw)), offsets, ends, np.zeros(n, bool))
+    curves = Curves(
+        raw, arc_lengths(raw, offsets), np.ones(len(raw)), offsets, ends, np.zeros(n, bool), np.ones(len(raw))
+    )
     return curves, Ends(
         place, kind, np.r_[0, n, n + np.arange(1, n + 1)], np.r_[2 * np.arange(n), 2 * np.arange(n) + 1]
     )
