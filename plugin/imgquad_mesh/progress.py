@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 import pyvista_validation
@@ -37,6 +37,22 @@ def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, int, int], None]]:
             progress.update(task, description=DOING[stage], completed=number, total=total)
 
         yield show
+
+
+@contextmanager
+def counting_if(wanted: bool, expected: Mapping[str, int]) -> Iterator[Callable[[str], None]]:
+    """Give a function to call with the kind of each step that ends; it draws a bar a kind of those expected."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not (wanted and console.is_terminal):
+        yield lambda kind: None
+        return
+    columns = (TextColumn("{task.description:12}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        bars = {kind: progress.add_task(kind, total=n) for kind, n in expected.items()}
+        yield lambda kind: progress.advance(bars[kind]) if kind in bars else None
 
 
 @contextmanager

@@ -1,3 +1,3 @@
-from . import console, demo, list_filters, rock_picture, run, script
+from . import console, demo, list_filters, rock_picture, run, script, stack
 
-__all__ = ["console", "demo", "list_filters", "rock_picture", "run", "script"]
+__all__ = ["console", "demo", "list_filters", "rock_picture", "run", "script", "stack"]

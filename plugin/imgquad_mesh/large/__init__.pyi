@@ -1,0 +1,3 @@
+from .stack import StackResult, mesh_stack
+
+__all__ = ["StackResult", "mesh_stack"]

@@ -1,0 +1,82 @@
+"""Where steps run: on a client that is there, on workers that are started here, or in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import Any
+
+from imgquad_core.errors import InputError
+
+from .graph import ClusterError, Step, Told, run_here, run_on
+
+REACHED = 20  #: seconds in which a scheduler must answer
+
+
+@contextmanager
+def opened(workers: int, scheduler: str | None) -> Iterator[Any]:
+    """Give a client of a scheduler, or of so many workers on this machine; None for one worker: this process.
+
+    Raises
+    ------
+    InputError
+        Dask is not installed, or there is no scheduler at the address.
+    """
+    if scheduler is None and workers <= 1:
+        yield None
+        return
+    if find_spec("distributed") is None:
+        raise InputError("more than one worker needs Dask: pip install dask distributed (or imgquad-mesh[dask])")
+    from distributed import Client, LocalCluster
+
+    if scheduler is not None:
+        with _reached(scheduler) as client:
+            yield client
+        return
+    warm_up()
+    dashboard = ":0" if find_spec("bokeh") else None
+    options = {"threads_per_worker": 1, "dashboard_address": dashboard, "silence_logs": 50}
+    with LocalCluster(n_workers=workers, **options) as cluster, Client(cluster) as client:
+        yield client
+
+
+def _reached(address: str) -> Any:
+    from distributed import Client
+
+    try:
+        return Client(address, timeout=REACHED, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise ClusterError(
+            f"no scheduler answers at {address}: start one (dask scheduler), or give --workers"
+        ) from error
+
+
+def warm_up() -> None:
+    """Compile the kernels in this process, if that was never done: else each worker would."""
+    import numpy as np
+
+    from imgquad_core import MeshOptions, mesh_image
+    from imgquad_core.jit import share_on_disk
+
+    if share_on_disk() < 0.9:
+        labels = np.add.outer(np.arange(48) // 24, np.arange(48) // 24)
+        mesh_image(labels, MeshOptions(size=3.0))
+
+
+def run_steps(steps: Iterable[Step], client: Any, told: Told) -> dict[str, Any]:
+    """Run steps on a client, the current one if None is given; in this process if there is none."""
+    client = client or _current()
+    return run_here(steps, told) if client is None else run_on(client, steps, told)
+
+
+def _current() -> Any:
+    """Return the client of Dask that is current here, None if there is none."""
+    if find_spec("distributed") is None:
+        return None
+    from distributed import default_client
+
+    try:
+        return default_client()
+    except ValueError:
+        return None
