@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .arrays import Flags, Floats, Ints
-from .model import VOID, BoundaryGraph
+from .model import VOID, BoundaryGraph, PointKind
 
 
 class Places(NamedTuple):
@@ -36,7 +36,7 @@ def edges_of_chains(graph: BoundaryGraph) -> Ints:
 
 
 def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
-    """Return the graph with a mid-point on every edge of the flagged chains."""
+    """Return the graph with a mid-point on every edge of the flagged chains, but for held ones."""
     return _split(graph, chains[chain_of_places(graph)])
 
 
@@ -90,6 +90,8 @@ def _split(graph: BoundaryGraph, split: Flags) -> BoundaryGraph:
     n, chain = len(graph.points), chain_of_places(graph)
     split = split.copy()
     split[offsets[1:] - 1] = False  # no edge behind the last point of a chain
+    is_held = graph.point_kind[ids] == PointKind.HELD
+    split &= ~is_held & ~np.roll(is_held, -1)
     at = np.flatnonzero(split)
     new = n + np.arange(len(at))
     points = np.vstack([graph.points, 0.5 * (graph.points[ids[at]] + graph.points[ids[at + 1]])])

@@ -26,6 +26,7 @@ class PointKind(IntEnum):
     FRAME = 2  #: on the picture's border, inside a chain: slides along the border
     CORNER = 3  #: a corner of the picture or a sharp corner of a chain: stays
     INTERIOR = 4  #: of a mesh only, on no chain: moves freely
+    HELD = 5  #: inside a chain that somebody else meshes up to, too: stays, and its edges are not cut
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,14 +1,15 @@
 from .areas import enclosed_areas
-from .extraction import extract_boundaries
+from .extraction import extract_boundaries, label_regions
 from .oblong_pixels import TrueShape, true_shape
 from .options import ExtractionOptions, SmoothingOptions
 from .periodic import DIRECTIONS, match_opposite_sides, rematch
-from .smoothing import smooth_boundaries
+from .smoothing import Smoothed, smooth_boundaries, smooth_chains
 from .stairs import Step, as_step, find_step
 
 __all__ = [
     "DIRECTIONS",
     "ExtractionOptions",
+    "Smoothed",
     "SmoothingOptions",
     "Step",
     "TrueShape",
@@ -16,8 +17,10 @@ __all__ = [
     "enclosed_areas",
     "extract_boundaries",
     "find_step",
+    "label_regions",
     "match_opposite_sides",
     "rematch",
     "smooth_boundaries",
+    "smooth_chains",
     "true_shape",
 ]

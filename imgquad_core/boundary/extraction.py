@@ -30,6 +30,7 @@ from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind
 
 from .options import ExtractionOptions
 
+Box = tuple[int, int, int, int]
 OUTSIDE = -2  #: colour of what lies around the picture
 # One byte for each pixel corner: bits 0-3 the sides with two colours, bits 4-5 what the chains do there,
 # bits 6-7 whether the side to the right and the side below have been traced.
@@ -87,6 +88,34 @@ def extract_boundaries(image: LabelImage, options: ExtractionOptions | None = No
         np.bincount(run_region[inside], run_pixels[inside], len(first_run)).astype(np.int64),
         image.shape,
     )
+
+
+def label_regions(labels: Labels, box: Box, options: ExtractionOptions | None = None) -> Labels:
+    """Number the regions within a part of a picture, as `extract_boundaries` would tell them.
+
+    Parameters
+    ----------
+    labels : int32, shape (n_rows, n_cols)
+        Labels of the part and of what lies around it: `REACH` data points at least, where the picture goes on.
+    box : tuple of int
+        Left, upper, right, lower bound of the part.
+    options : ExtractionOptions, optional
+        What to do with ambiguous places.
+
+    Returns
+    -------
+    int32
+        Number of each pixel's region by first pixels, -1 where it is `VOID`.
+    """
+    options = options or ExtractionOptions()
+    left, upper, right, lower = box
+    code = _classify_corners(np.pad(labels, 1, constant_values=OUTSIDE), corner_rule(options.policy, options.step))
+    part, code = np.ascontiguousarray(labels[upper:lower, left:right]), code[upper : lower + 1, left : right + 1].copy()
+    code[:, 0] |= np.uint8(_DOWN)  # a run begins at the left of the part
+    starts = np.flatnonzero(code[:-1, :-1] & _DOWN)
+    rows = np.searchsorted(starts, np.arange(part.shape[0] + 1) * part.shape[1])
+    run_region, _ = _label_runs(code, part, starts, rows)
+    return np.repeat(run_region, np.diff(starts, append=part.size)).astype(np.int32).reshape(part.shape)
 
 
 def _count_sides(code: Bytes) -> int:

@@ -79,7 +79,13 @@ class _Grid(NamedTuple):
     cell: float
 
 
-def join_short_chains(chains: PixelChains, shortest: float, farthest: float, units: Floats | float = UNITS) -> Joined:
+def join_short_chains(
+    chains: PixelChains,
+    shortest: float,
+    farthest: float,
+    units: Floats | float = UNITS,
+    barred: Flags | None = None,
+) -> Joined:
     """Join the ends of chains below a length.
 
     Parameters
@@ -92,6 +98,8 @@ def join_short_chains(chains: PixelChains, shortest: float, farthest: float, uni
         How far a node may go from its old place.
     units : float or float64, shape (2,)
         Steps of the grid on which coordinates are exact, a unit of length, of x and y.
+    barred : bool, shape (n_chains,), optional
+        Chains that stay, however short.
 
     Returns
     -------
@@ -103,7 +111,7 @@ def join_short_chains(chains: PixelChains, shortest: float, farthest: float, uni
     candidates = _short(curves.raw, curves.offsets, curves.ends, shortest)
     if shortest <= 0.0 or not len(candidates):
         return nothing
-    forbidden = np.zeros(len(curves.ends), bool)
+    forbidden = np.zeros(len(curves.ends), bool) if barred is None else barred.copy()
     ring, first = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
     rank = _ranks(ends.place, ends.kind, chains.graph.shape)
     is_outer = (chains.graph.chain_regions == VOID).any(axis=1)

@@ -60,11 +60,27 @@ def smooth_boundaries(
         even number of edges for every piece between corners, on every chain; all points, and the points at even places
         alone, form polylines that neither cross nor touch. Coordinates are multiples of 2^-14 px.
     """
-    options = options or SmoothingOptions()
+    return smooth_chains(graph, options or SmoothingOptions(), shape).graph
+
+
+class Smoothed(NamedTuple):
+    """A smoothed boundary, and which chains of the pixel boundary are left."""
+
+    graph: BoundaryGraph
+    which: Ints  #: (n_chains,) number of each chain among those of the pixel boundary
+
+
+def smooth_chains(
+    graph: BoundaryGraph,
+    options: SmoothingOptions,
+    shape: tuple[int, int] | None = None,
+    barred: Flags | None = None,
+) -> Smoothed:
+    """Do what `smooth_boundaries` does; `barred` chains are not joined, however short."""
     step = find_step(graph) if options.step == "auto" else as_step(options.step)
     true = _TrueShape.of(graph.shape, shape, step)
     pores = pores_of(graph)
-    chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step)
+    chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step, barred)
     width = 0.5 * options.tolerance / true.unit
     if width > 1.0:
         chains = averaged(chains, width, UNITS * np.array(step))
@@ -96,7 +112,7 @@ def smooth_boundaries(
     nodes = restore_areas_freely(sides, areas / true.unit**2, draft, nodes, room, options.max_shift, gently)
     nodes = nodes._replace(points=snapped(nodes.points * true.unit))
     pixels = np.maximum(np.rint(graph.region_pixels * true.pixel), 1).astype(np.int64)
-    return _graph(replace(chains.graph, shape=true.shape, region_pixels=pixels), draft, nodes)
+    return Smoothed(_graph(replace(chains.graph, shape=true.shape, region_pixels=pixels), draft, nodes), which)
 
 
 class _TrueShape(NamedTuple):
@@ -121,12 +137,14 @@ class _TrueShape(NamedTuple):
         return _TrueShape((rows, cols), unit, (rows / unit, cols / unit), pixel)
 
 
-def _joined(chains: PixelChains, options: SmoothingOptions, unit: float, step: Step) -> tuple[PixelChains, Ints]:
+def _joined(
+    chains: PixelChains, options: SmoothingOptions, unit: float, step: Step, barred: Flags | None
+) -> tuple[PixelChains, Ints]:
     """Join short chains, in data points; also return the old number of each chain."""
     usual = max(2.0 * options.max_shift, options.tolerance / unit)
     shortest = usual if options.join is None else options.join / unit
     farthest = max(0.5 * shortest, options.max_shift)
-    joined = join_short_chains(chains, shortest, farthest, UNITS * np.array(step))
+    joined = join_short_chains(chains, shortest, farthest, UNITS * np.array(step), barred)
     return joined.chains, joined.which
 
 

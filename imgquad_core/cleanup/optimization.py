@@ -49,14 +49,14 @@ def optimize(mesh: QuadMesh, options: OptimizationOptions | None = None) -> Quad
         become fewer.
     """
     options = options or OptimizationOptions()
-    old = _cut_at_chains(mesh)
+    old = cut_at_chains(mesh)
     how = EFFORTS[options.effort]
     new = joined(in_batches(old, lambda part: _relaxed(clean_up(_relaxed(part), how)), options.threads))
     better = _is_better(old, new, len(mesh.region_label))
-    return _stitch(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))
+    return stitched_onto(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))
 
 
-def _cut_at_chains(mesh: QuadMesh) -> FaceQuads:
+def cut_at_chains(mesh: QuadMesh) -> FaceQuads:
     """Give each sector between two boundary lines a point of its own."""
     sector = sectors_of(mesh)
     node = np.empty(sector.max() + 1, np.int64)
@@ -124,7 +124,7 @@ def _irregular(mesh: FaceQuads, n_faces: int) -> Ints:
     return np.bincount(mesh.face[corners[offsets[:-1][odd]] >> 2], minlength=n_faces)
 
 
-def _stitch(mesh: QuadMesh, quads: FaceQuads) -> QuadMesh:
+def stitched_onto(mesh: QuadMesh, quads: FaceQuads) -> QuadMesh:
     """Join faces at the boundary's points, which come first."""
     rim = np.unique(mesh.chain_points)
     place = np.full(mesh.n_points, -1, np.int64)

@@ -166,7 +166,7 @@ def legend_of(sample: Picture, tallies: Sequence[Tally | None], options: Segment
     return _of_shades(sample, options)
 
 
-def label_by(picture: Picture, legend: Legend, options: SegmentationOptions) -> Segmentation:
+def label_by(picture: Picture, legend: Legend, options: SegmentationOptions, may_be_void: bool = False) -> Segmentation:
     """Give each pixel of a picture its material by a legend.
 
     Parameters
@@ -177,6 +177,8 @@ def label_by(picture: Picture, legend: Legend, options: SegmentationOptions) -> 
         Of this picture and others.
     options : SegmentationOptions
         What becomes of void and transparent pixels.
+    may_be_void : bool
+        Whether a picture without any material is a picture, too.
 
     Raises
     ------
@@ -186,6 +188,8 @@ def label_by(picture: Picture, legend: Legend, options: SegmentationOptions) -> 
     _assert_alike(picture, legend.form, legend.palette, "the others")
     void = with_minus_one(picture.values, void_of(picture, options)) if len(legend.codes) else void_of(picture, options)
     if void is not None and void.all():
+        if may_be_void:
+            return Segmentation(LabelImage(np.full(picture.shape, VOID), legend.materials), legend.quantised)
         raise InputError(f"{picture.name} holds no pixel with a material: all are void")
     labels = legend.numbers[in_flat_colours(picture, legend.codes)] if len(legend.codes) else _shaded(picture, legend)
     if void is not None:

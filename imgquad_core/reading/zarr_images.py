@@ -57,6 +57,37 @@ def read_zarr(path: Path, options: ReadOptions) -> Picture:
         return replace(found, calibration=Calibration(_size(level)), notes=(level.note,) if level.note else ())
 
 
+class ZarrPlane(NamedTuple):
+    """A plane of a Zarr array, of which windows are read."""
+
+    array: Any
+    place: tuple[Any, ...]  #: of axes outside the plane; slices stand for rows and columns
+    rows_at: int
+    shape: tuple[int, int]
+    is_labels: bool
+    calibration: Calibration
+
+    def at(self, box: tuple[int, int, int, int]) -> tuple[Any, ...]:
+        """Return the index of left, upper, right, lower bounds."""
+        left, upper, right, lower = box
+        index = list(self.place)
+        index[self.rows_at], index[self.rows_at + 1] = slice(upper, lower), slice(left, right)
+        return tuple(index)
+
+
+def plane_of_zarr(path: Path, options: ReadOptions) -> ZarrPlane:
+    """Return the plane that `read_zarr` would read, without its values."""
+    zarr = optional("zarr", path)
+    with decoding(path):
+        level = _level(path, zarr.open(path, mode="r"), options)
+        index = _index(path, level, options)
+        rows_at = level.axes.index("y")
+        if level.axes.index("x") != rows_at + 1:
+            raise InputError(f"{path} has the axes {level.axes}: save it with x behind y")
+        shape = (int(level.array.shape[rows_at]), int(level.array.shape[rows_at + 1]))
+        return ZarrPlane(level.array, index, rows_at, shape, level.is_labels, Calibration(_size(level)))
+
+
 # ------------------------------------------------------------------------------------------------- metadata
 
 
@@ -144,20 +175,26 @@ def _size(level: Level) -> PixelSize | None:
 
 
 def _plane(path: Path, level: Level, options: ReadOptions) -> NDArray[Any]:
+    index = _index(path, level, options)
+    length = dict(zip(level.axes, level.array.shape, strict=True))
+    assert_pixels(path, length["x"], length["y"], options)
+    _assert_sound(path, level.array, index)
+    values = np.asarray(level.array[index])
+    return values if level.axes.index("y") < level.axes.index("x") else values.swapaxes(0, 1)
+
+
+def _index(path: Path, level: Level, options: ReadOptions) -> tuple[Any, ...]:
+    """Return the index of the plane that is asked for."""
     array, axes = level.array, level.axes
     if len(axes) != array.ndim or "y" not in axes or "x" not in axes or array.dtype.kind not in "biuf":
         raise InputError(f"{path} has the axes {axes} and shape {array.shape} of {array.dtype}: give a picture of y, x")
     length = dict(zip(axes, array.shape, strict=True))
-    assert_pixels(path, length["x"], length["y"], options)
     colours = axes[-1] == "c" and length["c"] <= 4 and options.channel is None
     inner = "yxc" if colours else "yx"
     names = {"c": "channel", "t": "time", "z": "plane"}
     outer = tuple((names.get(axis, axis), n) for axis, n in length.items() if axis not in inner)
     place = Stack(str(path), outer).choose(options) if outer else {}
-    index = tuple(slice(None) if axis in inner else place[names.get(axis, axis)] for axis in axes)
-    _assert_sound(path, array, index)
-    values = np.asarray(array[index])
-    return values if axes.index("y") < axes.index("x") else values.swapaxes(0, 1)
+    return tuple(slice(None) if axis in inner else place[names.get(axis, axis)] for axis in axes)
 
 
 def _assert_sound(path: Path, array: Any, index: tuple[Any, ...]) -> None:

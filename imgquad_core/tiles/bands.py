@@ -1,0 +1,186 @@
+"""Bands across former seams: the clean-up of irregular nodes and quality that the seam has kept apart.
+
+    |-- held --|-- 14 quads --|-- 8: seeds --| seam |-- 8: seeds --|-- 14 quads --|-- held --|
+
+The quads of one region on both sides are put together, the seam's nodes are free like others, and cavities around
+irregular nodes near it are filled anew. Real boundaries and the rims of the band stay to the bit. Three rounds, so that
+no quad is in two bands at once: seams from top to bottom, seams from left to right, corners of tiles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
+from imgquad_core.cleanup.irregular_nodes import clean_up
+from imgquad_core.cleanup.optimization import cut_at_chains, stitched_onto
+from imgquad_core.cleanup.options import CleanUp
+from imgquad_core.cleanup.relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
+from imgquad_core.cleanup.strips import nodes_around
+from imgquad_core.geometry.halfedge import twins_of
+from imgquad_core.geometry.quad_shape import lower_to_worst
+from imgquad_core.model import Materials
+from imgquad_core.tracing import trace_mesh
+
+from .grid import BAND, CLEAR, CORNER, Grid
+from .meshes import Patch, TileMesh, joined_meshes
+
+SEEDS = 8  #: quads from the seam within which irregular nodes are looked at
+PASSES = (CleanUp((40, 160, 600), 0.5, 0.6), CleanUp((16, 40, 80, 160), 0.5, 0.6))
+GOOD_ENOUGH = 0.5  #: scaled Jacobian down to which the worst quad of a face may fall for fewer irregular nodes
+ROUNDS = ("down", "across", "corner")
+
+
+def groups_of(grid: Grid, kind: str) -> list[tuple[int, ...]]:
+    """Return the tiles that each band of a round lies in, in their order: two, or four around a corner."""
+    found: list[tuple[int, ...]] = []
+    for t in range(grid.n_tiles):
+        row, column = grid.place(t)
+        to_right, below = column + 1 < grid.across, row + 1 < grid.down
+        if kind == "down" and to_right:
+            found.append((t, t + 1))
+        if kind == "across" and below:
+            found.append((t, t + grid.across))
+        if kind == "corner" and to_right and below:
+            found.append((t, t + 1, t + grid.across, t + grid.across + 1))
+    return found
+
+
+def seam_places(grid: Grid, kind: str, group: tuple[int, ...], size: float) -> Callable[[Floats], Flags]:
+    """Return what tells the places whose seams a band takes: away from corners of tiles, or near one."""
+    row, column = grid.place(group[-1])
+    line, level = column * grid.tile, grid.shape[0] - row * grid.tile  # x and y of the lines that meet
+    near, far = CORNER * size, CLEAR * size
+    n_rows, n_cols = grid.shape
+
+    def along(values: Floats, last: int, flip: bool) -> Flags:
+        """Tell what is away from the lines across a seam; the picture's own borders are no such lines."""
+        v = n_rows - values if flip else values
+        nearest = np.rint(v / grid.tile) * grid.tile
+        return np.asarray((np.abs(v - nearest) >= far) | (nearest <= 0) | (nearest >= last))
+
+    def tell(points: Floats) -> Flags:
+        x, y = points.T
+        if kind == "corner":
+            return np.asarray((np.abs(x - line) <= near) & (np.abs(y - level) <= near))
+        if kind == "down":
+            return np.asarray((np.abs(x - line) <= near) & along(y, n_rows, True))
+        return np.asarray((np.abs(y - level) <= near) & along(x, n_cols, False))
+
+    return tell
+
+
+def cleaned_band(
+    grid: Grid, group: tuple[int, ...], meshes: list[TileMesh], is_place: Callable[[Floats], Flags]
+) -> list[Patch]:
+    """Clean up across the seams of some tiles; return what is new in each.
+
+    Parameters
+    ----------
+    grid : Grid
+        The tiles.
+    group : tuple of int
+        Their numbers.
+    meshes : list of TileMesh
+        As they are now.
+    is_place : callable
+        Tells the places whose seams count.
+    """
+    whole, tile, place = joined_meshes(meshes)
+    several = np.bincount(_pairs(whole, tile), minlength=len(whole.points)) > 1
+    seam = whole.seam & several & is_place(whole.points)
+    if not seam.any():
+        return [_nothing()] * len(group)
+    beside = np.isin(whole.region, np.unique(whole.region[seam[whole.quads].any(axis=1)]))
+    quads = np.flatnonzero(beside & nodes_around(whole.quads, seam, BAND - 1)[whole.quads].any(axis=1))
+    points, corners, region = _cleaned(whole, quads, nodes_around(whole.quads, seam, SEEDS))
+    centre = points[corners].mean(axis=1)
+    column, row = centre[:, 0] // grid.tile, (grid.shape[0] - centre[:, 1]) // grid.tile
+    owner = (row * grid.across + column).astype(np.int64)
+    owner = np.where(np.isin(owner, group), owner, group[0])
+    patches = []
+    for k, t in enumerate(group):
+        used, at = np.unique(corners[owner == t], return_inverse=True)
+        gone = place[quads[tile[quads] == k]]
+        patches.append(Patch(gone, points[used], at.reshape(-1, 4).astype(np.int64), region[owner == t]))
+    return patches
+
+
+def _nothing() -> Patch:
+    none = np.empty(0, np.int64)
+    return Patch(none, np.empty((0, 2)), none.reshape(0, 4), none)
+
+
+def _pairs(whole: TileMesh, tile: Ints) -> Ints:
+    """Return the node of each pair of a node and a tile that has it."""
+    n = int(tile.max(initial=0)) + 1
+    return np.unique(whole.quads * n + tile[:, None]) // n
+
+
+def _cleaned(whole: TileMesh, quads: Ints, near: Flags) -> tuple[Floats, Ints, Ints]:
+    """Return points, quads and their regions that take the place of some quads."""
+    used, corners = np.unique(whole.quads[quads], return_inverse=True)
+    corners = corners.reshape(-1, 4)
+    regions, label = np.unique(whole.region[quads], return_inverse=True)
+    names = tuple(map(str, regions.tolist()))
+    materials = Materials(np.arange(len(regions), dtype=np.int32), names, np.zeros((len(regions), 3), np.uint8))
+    mesh = trace_mesh(whole.points[used], corners, label, materials)
+    old = _held(cut_at_chains(mesh), _on_rim(whole, quads)[used], used)
+    seeds = near[used]
+    new = old
+    for how in PASSES:
+        new = _relaxed(clean_up(_relaxed(new), how, _seeds(new, mesh.points, seeds)))
+    better = _is_better(old, new, len(mesh.region_label))
+    made = stitched_onto(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))
+    return np.asarray(made.points), np.asarray(made.quads), regions[made.quad_material]
+
+
+def _on_rim(whole: TileMesh, quads: Ints) -> Flags:
+    """Tell the nodes where the band ends inside a region: they are held, with as many quads as they have."""
+    inside = np.zeros(len(whole.quads), bool)
+    inside[quads] = True
+    twins = twins_of(whole.quads, len(whole.points))
+    h = np.flatnonzero((twins >= 0) & np.repeat(inside, 4))
+    h = h[~inside[twins[h] // 4] & (whole.region[h // 4] == whole.region[twins[h] // 4])]
+    rim = np.zeros(len(whole.points), bool)
+    rim[whole.quads.ravel()[h]] = rim[np.roll(whole.quads, -1, axis=1).ravel()[h]] = True
+    return rim
+
+
+def _held(faces: FaceQuads, on_rim: Flags, used: Ints) -> FaceQuads:
+    """Let nodes where the band ends want the quads that they have."""
+    here = np.bincount(faces.quads.ravel(), minlength=len(faces.points))
+    held = (faces.origin >= 0) & on_rim[np.maximum(faces.origin, 0)]
+    return faces._replace(wanted=np.where(held, here, faces.wanted))
+
+
+def _seeds(faces: FaceQuads, points: Floats, near: Flags) -> Flags:
+    """Tell the nodes near the seam: by place, as old ones may be gone."""
+    from scipy.spatial import cKDTree
+
+    if not near.any():
+        return np.zeros(len(faces.points), bool)
+    quads = faces.points[faces.quads]
+    edge = float(np.median(np.hypot(*(quads[:, 1] - quads[:, 0]).T)))
+    return np.asarray(cKDTree(points[near]).query(faces.points)[0] <= 1.25 * edge)
+
+
+def _relaxed(part: FaceQuads) -> FaceQuads:
+    points, free = part.points.copy(), part.origin < 0
+    rings = rings_of(part.quads, len(points))
+    laplace(points, rings, free, 8)
+    untangle(points, rings, free, 2, BAD)
+    newton(points, rings, free, 6, GOOD)
+    untangle(points, rings, free, 4, 0.86)
+    return part._replace(points=points)
+
+
+def _is_better(old: FaceQuads, new: FaceQuads, n_faces: int) -> Flags:
+    """Tell the faces whose worst quad does not fall, or stays good."""
+    before, after = np.ones((2, n_faces))
+    lower_to_worst(old.points, old.quads, old.face, before)
+    lower_to_worst(new.points, new.quads, new.face, after)
+    return np.asarray((after >= np.minimum(before, GOOD_ENOUGH)) & (after > 0.0))

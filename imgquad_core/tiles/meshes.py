@@ -1,0 +1,135 @@
+"""The mesh of a tile's faces, and what is done to it afterwards."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.errors import TopologyError
+from imgquad_core.mesher import MeshingOptions, mesh_boundaries
+from imgquad_core.model import VOID
+
+from .grid import Box
+from .outlines import Outlines, graph_of
+
+
+class TileMesh(NamedTuple):
+    """Quads of a tile, in coordinates of the picture (px, y up from its lower edge)."""
+
+    points: Floats  #: (n, 2)
+    quads: Ints  #: (m, 4) counter-clockwise
+    region: Ints  #: (m,) number in the picture
+    seam: Flags  #: (n,) nodes between two pieces of one region
+
+
+class Patch(NamedTuple):
+    """What takes the place of some quads of a tile."""
+
+    gone: Ints  #: their places
+    points: Floats
+    quads: Ints
+    region: Ints
+
+
+def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: MeshingOptions) -> TileMesh:
+    """Mesh the faces of a tile.
+
+    Parameters
+    ----------
+    outlines : Outlines
+        From `settled`.
+    window : tuple of int
+        Left, upper, right, lower bound of what the tile sees.
+    n_rows : int
+        Of the picture.
+    options : MeshingOptions
+        How faces are filled.
+
+    Raises
+    ------
+    TopologyError
+        Faces cannot be filled without edges of other tiles being halved.
+    """
+    if len(outlines.region) == 0:
+        none = np.empty(0, np.int64)
+        return TileMesh(np.empty((0, 2)), none.reshape(0, 4), none, np.empty(0, bool))
+    try:
+        mesh = mesh_boundaries(graph_of(outlines, window, n_rows), options)
+    except TopologyError as error:
+        raise TopologyError(f"{error}, in the window {window} of a tile") from error
+    seam = np.zeros(mesh.n_points, bool)
+    for c in np.flatnonzero(outlines.seam):
+        seam[mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]] = True
+    shift = np.array([window[0], n_rows - window[3]], float)
+    return TileMesh(mesh.points + shift, mesh.quads, outlines.region[mesh.quad_region], seam)
+
+
+def patched(mesh: TileMesh, patches: list[Patch]) -> TileMesh:
+    """Return a mesh with some of its quads replaced; nodes at the same place are one."""
+    if not patches:
+        return mesh
+    kept = np.ones(len(mesh.quads), bool)
+    for patch in patches:
+        kept[patch.gone] = False
+    shift = np.cumsum([len(mesh.points), *(len(patch.points) for patch in patches)])
+    quads = [mesh.quads[kept], *(patch.quads + s for patch, s in zip(patches, shift, strict=False))]
+    points = np.concatenate([mesh.points, *(patch.points for patch in patches)])
+    seam = np.append(mesh.seam, np.zeros(len(points) - len(mesh.points), bool))
+    region = np.concatenate([mesh.region[kept], *(patch.region for patch in patches)])
+    return welded(TileMesh(points, np.concatenate(quads), region, seam))
+
+
+def welded(mesh: TileMesh) -> TileMesh:
+    """Return a mesh with one node at each place that quads use, in the order that nodes come first."""
+    used = np.zeros(len(mesh.points), bool)
+    used[mesh.quads] = True
+    ids = np.flatnonzero(used)
+    first, node = same_places(mesh.points[ids])
+    new = np.full(len(mesh.points), -1, np.int64)
+    new[ids] = node
+    seam = np.zeros(len(first), bool)
+    np.logical_or.at(seam, node, mesh.seam[ids])
+    return TileMesh(mesh.points[ids[first]], new[mesh.quads], mesh.region, seam)
+
+
+def same_places(points: Floats) -> tuple[Ints, Ints]:
+    """Return the first of the points at each place, in their order, and the place of each point: equal to the bit."""
+    _, first, node = np.unique(bits_of(points), return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[node.ravel()]
+
+
+def bits_of(points: Floats) -> NDArray[np.complex128]:
+    """Return each point as one value: to sort, and to compare to the bit."""
+    return np.ascontiguousarray(points, np.float64).view(np.complex128).ravel()
+
+
+def joined_meshes(meshes: list[TileMesh]) -> tuple[TileMesh, Ints, Ints]:
+    """Put tiles together; return also which one each quad is of, and its place there."""
+    shift = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    whole = TileMesh(
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([mesh.quads + s for mesh, s in zip(meshes, shift, strict=False)]),
+        np.concatenate([mesh.region for mesh in meshes]),
+        np.concatenate([mesh.seam for mesh in meshes]),
+    )
+    counts = [len(mesh.quads) for mesh in meshes]
+    place = np.concatenate([np.arange(n) for n in counts]) if counts else np.empty(0, np.int64)
+    return welded(whole), np.repeat(np.arange(len(meshes)), counts), place
+
+
+def open_nodes(mesh: TileMesh) -> Ints:
+    """Return the nodes on edges with a quad on one side only: those that other tiles may have, too."""
+    from imgquad_core.geometry.halfedge import twins_of
+
+    if len(mesh.quads) == 0:
+        return np.empty(0, np.int64)
+    twins = twins_of(mesh.quads, len(mesh.points))
+    h = np.flatnonzero(twins == VOID)
+    corners = mesh.quads.ravel()
+    return np.asarray(np.unique(np.concatenate([corners[h], np.roll(mesh.quads, -1, axis=1).ravel()[h]])))

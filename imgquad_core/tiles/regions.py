@@ -1,0 +1,191 @@
+"""Regions of the whole picture, from what each tile sees of them: which stay whole, and whose they are.
+
+A tile numbers the regions in its own pixels and one more row and column, which its neighbours number too. Where both
+have the same pixel, both numbers are of one region::
+
+        tile 0   | tile 1
+      . . . . . .|x .            x: pixels of tile 1 and 2 that tile 0 numbers, too
+      . . . . . .|x .
+      -----------+----
+      x x x x x x x              tile 2
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from imgquad_core.arrays import Flags, Ints, Labels
+from imgquad_core.boundary import ExtractionOptions, label_regions
+from imgquad_core.model import VOID
+
+from .grid import Box, Grid
+
+
+class TileRegions(NamedTuple):
+    """Regions as one tile sees them, numbered by itself."""
+
+    ids: Labels  #: (n_rows, n_cols) of its pixels, -1 void
+    label: Labels  #: (n,) material of each
+    pixels: Ints  #: (n,) of the tile's own pixels
+    first: Ints  #: (n,) least number of such a pixel in the picture, row by row
+    box: Ints  #: (n, 4) left, upper, right, lower bound of these
+    below: Labels  #: ids in the row below the tile, one pixel more if there is a tile to the right
+    right: Labels  #: ids in the column to the right
+
+
+class Regions(NamedTuple):
+    """All regions of the picture, in the order of their first pixels."""
+
+    label: Labels
+    pixels: Ints
+    owner: Ints  #: tile of the first pixel
+    is_cut: Flags  #: too large to stay whole: each tile has its own piece
+    number: Ints  #: number of every tile's regions, tile by tile; -1 for those without own pixels
+    offsets: Ints  #: (n_tiles + 1,) where a tile's begin
+
+
+def tile_regions(
+    labels: Labels, window: Box, tile: Box, extended: Box, n_cols: int, options: ExtractionOptions
+) -> TileRegions:
+    """Number the regions of a tile.
+
+    Parameters
+    ----------
+    labels : int32
+        Labels of `window`.
+    window, tile, extended : tuple of int
+        Left, upper, right, lower bounds in the picture: `extended` is the tile with one more row and column where the
+        picture goes on, the window has some more pixels around that, which say what is joined over corners.
+    n_cols : int
+        Of the picture.
+    options : ExtractionOptions
+        What is joined over corners.
+    """
+    left, upper = window[:2]
+    inside = (extended[0] - left, extended[1] - upper, extended[2] - left, extended[3] - upper)
+    ids = label_regions(labels, inside, options)
+    height, width = tile[3] - tile[1], tile[2] - tile[0]
+    own = np.ascontiguousarray(ids[:height, :width])
+    seen = labels[inside[1] : inside[3], inside[0] : inside[2]]
+    n = int(ids.max(initial=-1)) + 1
+    label = np.full(n, VOID, np.int32)
+    label[ids[ids >= 0]] = seen[ids >= 0]
+    solid = np.flatnonzero(own.ravel() >= 0)
+    which = own.ravel()[solid]
+    row, column = solid // width + tile[1], solid % width + tile[0]
+    box = np.empty((n, 4), np.int64)
+    box[:, :2], box[:, 2:] = np.iinfo(np.int64).max, -1
+    for k, values in enumerate((column, row)):
+        np.minimum.at(box[:, k], which, values)
+        np.maximum.at(box[:, k + 2], which, values + 1)
+    first = np.full(n, np.iinfo(np.int64).max)
+    np.minimum.at(first, which, row * n_cols + column)
+    below = ids[height] if ids.shape[0] > height else np.empty(0, np.int32)
+    right = ids[:height, width] if ids.shape[1] > width else np.empty(0, np.int32)
+    return TileRegions(own, label, np.bincount(which, minlength=n).astype(np.int64), first, box, below, right)
+
+
+def joined_regions(grid: Grid, tiles: list[TileRegions]) -> Regions:
+    """Put together what tiles see of the regions.
+
+    Parameters
+    ----------
+    grid : Grid
+        The tiles.
+    tiles : list of TileRegions
+        In their order; of `ids` only the first row and the first column are looked at.
+    """
+    offsets = np.concatenate([[0], np.cumsum([len(tile.label) for tile in tiles])]).astype(np.int64)
+    pairs = [_shared(grid, t, tiles, offsets) for t in range(grid.n_tiles)]
+    a, b = np.concatenate(pairs, axis=1) if pairs else np.empty((2, 0), np.int64)
+    n = int(offsets[-1])
+    n_sets, of = connected_components(coo_array((np.ones(len(a), bool), (a, b)), (n, n)), directed=False)
+
+    def total(how: np.ufunc, name: str, start: int) -> NDArray[np.int64]:
+        values = np.concatenate([getattr(tile, name) for tile in tiles])
+        found = np.full((n_sets, *values.shape[1:]), start, np.int64)
+        how.at(found, of, values)
+        return found
+
+    first, pixels = total(np.minimum, "first", np.iinfo(np.int64).max), total(np.add, "pixels", 0)
+    low, high = total(np.minimum, "box", np.iinfo(np.int64).max)[:, :2], total(np.maximum, "box", -1)[:, 2:]
+    label = np.full(n_sets, VOID, np.int32)
+    label[of] = np.concatenate([tile.label for tile in tiles])
+    order = np.argsort(first, kind="stable")[: np.count_nonzero(pixels)]  # those without pixels come last
+    number = np.full(n_sets, -1, np.int64)
+    number[order] = np.arange(len(order))
+    low, high, first = low[order], high[order], first[order]
+    is_large = (high - low > grid.keep).any(axis=1)
+    in_tiles = (low // grid.tile != (high - 1) // grid.tile).any(axis=1)
+    row, column = first // grid.shape[1] // grid.tile, first % grid.shape[1] // grid.tile
+    own = np.concatenate([tile.pixels for tile in tiles]) > 0
+    return Regions(
+        label[order],
+        pixels[order],
+        row * grid.across + column,
+        is_large & in_tiles,
+        np.where(own, number[of], -1),
+        offsets,
+    )
+
+
+def _shared(grid: Grid, t: int, tiles: list[TileRegions], offsets: Ints) -> NDArray[np.int64]:
+    """Return pairs of numbers, in one row of all tiles' regions, that stand for the same pixel."""
+    row, column = grid.place(t)
+    found = [np.empty((2, 0), np.int64)]
+
+    def add(mine: Labels, other: int, theirs: Labels) -> None:
+        solid = mine >= 0
+        pairs = np.stack([mine[solid] + offsets[t], theirs[solid] + offsets[other]])
+        found.append(np.unique(pairs, axis=1))
+
+    width = tiles[t].ids.shape[1]
+    if row + 1 < grid.down:
+        add(tiles[t].below[:width], t + grid.across, tiles[t + grid.across].ids[0])
+        if column + 1 < grid.across:
+            add(tiles[t].below[width:], t + grid.across + 1, tiles[t + grid.across + 1].ids[0, :1])
+    if column + 1 < grid.across:
+        add(tiles[t].right, t + 1, tiles[t + 1].ids[:, 0])
+    return np.concatenate(found, axis=1)
+
+
+class Keys(NamedTuple):
+    """The picture that faces are extracted from: each pixel has the key of its face."""
+
+    pixels: Labels  #: (n_rows, n_cols) of a window, -1 void
+    region: Ints  #: (n_keys,) number in `Regions`
+    tile: Ints  #: (n_keys,) whose it is
+
+
+def keys_of(ids: NDArray[np.int64], tile: NDArray[np.int64], grid: Grid, regions: Regions) -> Keys:
+    """Return the keys of a window.
+
+    Parameters
+    ----------
+    ids : int64, shape (n_rows, n_cols)
+        Number of each pixel's region in `regions`, -1 void.
+    tile : int64, shape (n_rows, n_cols)
+        The tile that it lies in.
+    grid, regions
+        Of the picture.
+
+    Notes
+    -----
+    Keys rise with the material, then with region and tile, in every window: so ambiguous corners are decided alike.
+    """
+    solid = ids >= 0
+    region = ids[solid]
+    owner = np.where(regions.is_cut[region], tile[solid], regions.owner[region])
+    faces, at = np.unique(region * grid.n_tiles + owner, return_inverse=True)
+    region, owner = faces // grid.n_tiles, faces % grid.n_tiles
+    order = np.lexsort((owner, region, regions.label[region]))
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order))
+    pixels = np.full(ids.shape, VOID, np.int32)
+    pixels[solid] = place[at.ravel()]
+    return Keys(pixels, region[order], owner[order])
