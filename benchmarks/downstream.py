@@ -9,23 +9,29 @@ layers of moduli 1 and 10, nu = 0, pulled by 0.06: exact force 0.0727273.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 WORK = Path("/tmp/imgquad-downstream")
+#: built by hand from its source: it is in neither Debian nor PyPI
+ELMERGRID, ELMERGRID_VERSION = WORK / "elmergrid" / "ElmerGrid", "source of 2024-10-23"
 TOOLS = Path(__file__).with_name("downstream_tools")
 EXACT = {"heat": 40 / 33, "force": 0.06 * 40 / (30 / 1 + 30 / 10)}
 FLAT22 = ("--msh-version", "2.2")
 NONE = ("--interfaces", "none")
-NINE = ("--order", "2", "--nodes", "9")
+EIGHT = ("--order", "2")
+NINE = (*EIGHT, "--nodes", "9")
 VALUES = "".join(
     f'["material {m}"]\nyoung = {v}\npoisson = 0.0\nconductivity = {v}\n' for m, v in enumerate((1.0, 10.0))
 )
+UMAT = "".join(f'["material {m}"]\nuser_material = [{v}, 0.0]\n' for m, v in enumerate((1.0, 10.0)))
 
 
 @dataclass(frozen=True)
@@ -38,50 +44,120 @@ class Run:
     options: tuple[str, ...] = ()
     pip: tuple[str, ...] = ()  #: packages; their first one tells the version
     debian: str = ""  #: package that tells the version
+    materials: str = "by name"  #: how the script finds them: by our names, by the numbers in the file, or by place
+    borders: str = "by name"
+    refused: bool = False  #: the program takes no such element, and says so
 
 
 MESHIO = ("meshio", "h5py", "netCDF4")
+KRATOS = ("KratosMultiphysics", "KratosMedApplication", "KratosStructuralMechanicsApplication", "mpich")
+BY_NUMBER = {"materials": "by number", "borders": "by number"}
+PLAIN = {"materials": "by number", "borders": "by hand"}
+
+
+def pip(program: str, script: str, *packages: str, **common: str) -> Callable[..., Run]:
+    """Return what makes rows of a program that pip installs: `row(file, *options, **more)`."""
+    return lambda file, *options, **more: Run(program, script, file, options, packages, **common | more)
+
+
+def debian(program: str, script: str, package: str, **common: str) -> Callable[..., Run]:
+    """Return what makes rows of a program of Debian."""
+    return lambda file, *options, **more: Run(program, script, file, options, (), package, **common | more)
+
+
+mfem = pip("MFEM", "mfem_heat.py", "mfem")
+ngsolve = pip("NGSolve", "ngsolve_heat.py", "ngsolve")
+sfepy = pip("SfePy", "sfepy_heat.py", "sfepy", **PLAIN)
+felupe = pip("FElupe", "felupe_force.py", "felupe", *MESHIO)
+skfem = pip("scikit-fem", "skfem_heat.py", "scikit-fem", *MESHIO)
+kratos = pip("Kratos", "kratos_force.py", *KRATOS)
+opensees = pip("OpenSees", "opensees_force.py", "openseespy", "numpy")
+getfem = debian("GetFEM", "getfem_heat.py", "python3-getfem", **BY_NUMBER)
+dolfinx = debian("FEniCSx", "dolfinx_heat.py", "python3-dolfinx", **BY_NUMBER)
+dealii = debian("deal.II", "dealii_heat.cc", "libdeal.ii-dev", **BY_NUMBER)
+freefem = debian("FreeFEM", "freefem_heat.edp", "freefem++", **BY_NUMBER)
+openfoam = debian("OpenFOAM", "openfoam_heat.sh", "openfoam")
+calculix = debian("CalculiX", "calculix.sh", "calculix-ccx")
+umat = debian("CalculiX", "calculix_umat.sh", "calculix-ccx")
+elmergrid = debian("ElmerGrid", "elmergrid_heat.py", "")
+VALUED = ("--properties", "values.toml")
 RUNS = (
-    Run("MFEM", "mfem_heat.py", "a.msh", NONE, ("mfem",)),
-    Run("MFEM", "mfem_heat.py", "b.msh", (*NONE, *FLAT22), ("mfem",)),
-    Run("MFEM", "mfem_heat.py", "c.msh", (*NONE, *NINE), ("mfem",)),
-    Run("MFEM", "mfem_heat.py", "d.vtu", ("--plain",), ("mfem",)),
-    Run("MFEM", "mfem_heat.py", "e.vtk", ("--plain",), ("mfem",)),
-    Run("NGSolve", "ngsolve_heat.py", "a.msh", (*NONE, *FLAT22), ("ngsolve",)),
-    Run("SfePy", "sfepy_heat.py", "a.vtu", ("--plain",), ("sfepy",)),
-    Run("SfePy", "sfepy_heat.py", "b.vtk", ("--plain",), ("sfepy",)),
-    Run("FElupe", "felupe_force.py", "a.inp", (), ("felupe", *MESHIO)),
-    Run("FElupe", "felupe_force.py", "b.vtu", ("--plain",), ("felupe", *MESHIO)),
-    Run("scikit-fem", "skfem_heat.py", "a.msh", (), ("scikit-fem", *MESHIO)),
-    Run("scikit-fem", "skfem_heat.py", "b.msh", NINE, ("scikit-fem", *MESHIO)),
-    Run("OpenSees", "opensees_force.py", "a.npz", (), ("openseespy", "numpy")),
-    Run("GetFEM", "getfem_heat.py", "a.msh", (), debian="python3-getfem"),
-    Run("GetFEM", "getfem_heat.py", "b.msh", FLAT22, debian="python3-getfem"),
-    Run("FEniCSx", "dolfinx_heat.py", "a.xdmf", (), debian="python3-dolfinx"),
-    Run("FEniCSx", "dolfinx_heat.py", "b.xdmf", NINE, debian="python3-dolfinx"),
-    Run("deal.II", "dealii_heat.cc", "a.msh", NONE, debian="libdeal.ii-dev"),
-    Run("deal.II", "dealii_heat.cc", "b.msh", (*NONE, *FLAT22), debian="libdeal.ii-dev"),
-    Run("FreeFEM", "freefem_heat.edp", "heat.msh", ("--split-quads", *FLAT22), debian="freefem++"),
-    Run("OpenFOAM", "openfoam_heat.sh", "a.msh", ("--extrude", "10", *NONE), debian="openfoam"),
-    Run("OpenFOAM", "openfoam_heat.sh", "b.msh", ("--extrude", "10", *NONE, *FLAT22), debian="openfoam"),
-    Run(
-        "CalculiX", "calculix.sh", "a.inp", ("--deck", "thermal", "--properties", "values.toml"), debian="calculix-ccx"
-    ),
-    Run(
-        "CalculiX", "calculix.sh", "b.inp", ("--deck", "tension", "--properties", "values.toml"), debian="calculix-ccx"
-    ),
+    mfem("a.msh", *NONE),
+    mfem("b.msh", *NONE, *FLAT22),
+    mfem("c.msh", *NONE, *EIGHT, refused=True),
+    mfem("d.msh", *NONE, *NINE),
+    mfem("e.vtu", "--plain", **PLAIN),
+    mfem("f.vtk", "--plain", **PLAIN),
+    ngsolve("a.msh", *NONE, *FLAT22),
+    ngsolve("b.msh", *NONE, *FLAT22, *EIGHT, refused=True),
+    ngsolve("c.msh", *NONE, *FLAT22, *NINE, refused=True),
+    sfepy("a.vtu", "--plain"),
+    sfepy("b.vtk", "--plain"),
+    sfepy("c.vtu", "--plain", *EIGHT, refused=True),
+    sfepy("d.vtu", "--plain", *NINE, refused=True),
+    felupe("a.inp"),
+    felupe("b.vtu", borders="by hand"),
+    felupe("c.vtu", "--plain", materials="by number"),
+    felupe("d.vtk", "--plain", materials="by number"),
+    felupe("e.vtu", *EIGHT),
+    felupe("f.vtu", *NINE),
+    skfem("a.msh"),
+    skfem("b.msh", *EIGHT, refused=True),
+    skfem("c.msh", *NINE, borders="by hand"),
+    kratos("a.med"),
+    kratos("b.med", *EIGHT),
+    kratos("c.med", *NINE),
+    opensees("a.npz"),
+    opensees("b.npz", *EIGHT),
+    opensees("c.npz", *NINE),
+    getfem("a.msh"),
+    getfem("b.msh", *FLAT22),
+    getfem("c.msh", *EIGHT),
+    getfem("d.msh", *NINE),
+    dolfinx("a.xdmf"),
+    dolfinx("b.xdmf", *EIGHT, refused=True),
+    dolfinx("c.xdmf", *NINE),
+    dealii("a.msh", *NONE),
+    dealii("b.msh", *NONE, *FLAT22),
+    dealii("c.msh", *NONE, *EIGHT, refused=True),
+    dealii("d.msh", *NONE, *NINE, refused=True),
+    freefem("heat.msh", "--split-quads", *FLAT22),
+    openfoam("a.msh", "--extrude", "10", *NONE),
+    openfoam("b.msh", "--extrude", "10", *NONE, *FLAT22),
+    elmergrid("a.msh"),
+    elmergrid("b.msh", *FLAT22),
+    elmergrid("c.msh", *EIGHT),
+    elmergrid("d.msh", *NINE),
+    calculix("a.inp", "--deck", "thermal", *VALUED),
+    calculix("b.inp", "--deck", "tension", *VALUED),
+    umat("e.inp", "--deck", "tension", "--properties", "umat.toml"),
+    calculix("c.inp", "--deck", "thermal", *VALUED, *EIGHT),
+    calculix("d.inp", "--deck", "tension", *VALUED, *EIGHT),
 )
 
 
 def main() -> None:
-    """Print a row a run."""
+    """Print the table of runs, then which elements of order 2 each program took."""
     asked = set(sys.argv[1:])
     WORK.mkdir(exist_ok=True)
     heads = ("program", "version", "file", "options", "materials", "borders", "result", "error")
     print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
+    took: dict[str, dict[str, str]] = {}
     for run in RUNS:
         if not asked or run.program in asked:
-            print(f"| {' | '.join(row(run))} |", flush=True)
+            cells = row(run)
+            print(f"| {' | '.join(cells)} |", flush=True)
+            note_order(took.setdefault(run.program, {}), run, cells)
+    print("\n| program | 8 nodes | 9 nodes |\n|---|---|---|")
+    for program, answers in took.items():
+        print(f"| {program} | {answers.get('8', 'no file')} | {answers.get('9', 'no file')} |")
+
+
+def note_order(answers: dict[str, str], run: Run, cells: list[str]) -> None:
+    """Note what became of a file of order 2."""
+    if "--order" in run.options:
+        result, error = cells[-2:]
+        answers["9" if "9" in run.options else "8"] = f"yes, {error}" if error else result
 
 
 def row(run: Run) -> list[str]:
@@ -95,28 +171,55 @@ def row(run: Run) -> list[str]:
         return [run.program, "not installed", *shown, "", "", "not run", ""]
     write(folder, run)
     said = subprocess.run(command(run), cwd=folder, capture_output=True, text=True, env=environment(run))
-    values = dict(line.split(maxsplit=1) for line in said.stdout.splitlines() if len(line.split()) > 1)
+    values = told(said.stdout)
     for name, exact in EXACT.items():
         if name in values:
             found = float(values[name])
             where = [values.get("materials", "?"), values.get("borders", "?")]
-            return [run.program, installed, *shown, *where, f"{name} {found:.7f}", f"{abs(found / exact - 1):.1e}"]
-    last = (said.stderr or said.stdout).strip().splitlines()[-1:] or ["nothing"]
-    return [run.program, installed, *shown, "", "", f"fails: {last[0][:100]}", ""]
+            error = abs(found / exact - 1)
+            wrong = "" if error < 1e-6 else "WRONG: "
+            return [
+                run.program,
+                installed,
+                *shown,
+                *where,
+                f"{wrong}{name} {found:.7f}",
+                f"{error:.1e}",
+            ]
+    return [run.program, installed, *shown, "", "", f"{'refused' if run.refused else 'FAILS'}: {reason(said)}", ""]
+
+
+def reason(said: subprocess.CompletedProcess[str]) -> str:
+    """Return the line that tells most of why a program did not solve."""
+    lines = [line for line in (said.stdout + said.stderr).splitlines() if line.strip()]
+    telling = [line for line in lines if re.search(r"error|abort|unknown|not |only", line, re.IGNORECASE)]
+    return (telling or lines or [f"exit code {said.returncode}"])[-1].strip().replace("|", "/")[-100:]
+
+
+def told(output: str) -> dict[str, str]:
+    """Return what a script printed, by its first words."""
+    return dict(line.split(maxsplit=1) for line in output.splitlines() if len(line.split()) > 1)
 
 
 def write(folder: Path, run: Run) -> None:
     """Mesh the two layers with our command, into the folder."""
+    from imgquad_mesh.__main__ import main as command_line
+
     labels = np.zeros((40, 60), np.int32)
     labels[:, 30:] = 1
     np.save(folder / "layers.npy", labels)
     (folder / "values.toml").write_text(VALUES)
-    ours = [sys.executable, "-m", "imgquad_mesh", "run", "layers.npy", run.file, "--size", "6", "--quiet", *run.options]
-    subprocess.run(ours, cwd=folder, check=True)
+    (folder / "umat.toml").write_text(UMAT)
+    options = [str(folder / word) if word.endswith(".toml") else word for word in run.options]
+    ours = ["run", str(folder / "layers.npy"), str(folder / run.file), "--size", "6", "--quiet", *options]
+    if command_line(ours):
+        raise SystemExit(f"imgquad-mesh {' '.join(ours)} failed")
 
 
 def version(run: Run) -> str:
     """Version of the program, installed if pip has it; empty if it is missing."""
+    if run.program == "ElmerGrid":
+        return ELMERGRID_VERSION if ELMERGRID.exists() else ""
     if run.debian:
         query = ["dpkg-query", "-W", "-f", "${Version}", run.debian]
         found = subprocess.run(query, capture_output=True, text=True)
@@ -143,6 +246,8 @@ def command(run: Run) -> list[str]:
     script = TOOLS / run.script
     if run.pip:
         return [str(WORK / "venvs" / run.pip[0] / "bin" / "python"), str(script), run.file]
+    if run.program == "ElmerGrid":
+        return [sys.executable, str(script), run.file, str(ELMERGRID)]
     if script.suffix == ".cc":
         return [str(compiled(script)), run.file]
     start = {".py": ["/usr/bin/python3"], ".sh": ["bash"], ".edp": ["FreeFem++", "-nw", "-v", "0"]}[script.suffix]

@@ -48,7 +48,7 @@ form.RecoverFEMSolution(unknown, load, solution)
 flow = mfem.Vector(solution.Size())
 stiffness.Mult(solution, flow)
 print("materials", "by name" if names else "by number")
-print("borders", "by name" if names else "no")
+print("borders", "by name" if names else "by hand")
 print("heat", mfem.InnerProduct(solution, flow))
 boundary = mfem.intArray([1] * mesh.bdr_attributes.Max()) if ends else None
 if boundary is not None:

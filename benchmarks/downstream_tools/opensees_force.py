@@ -1,4 +1,4 @@
-"""Two elastic layers in OpenSees: `opensees_force.py FILE.npz`."""
+"""Two elastic layers in OpenSees: `opensees_force.py FILE.npz`, of 4, 8 or 9 nodes."""
 
 import sys
 
@@ -9,13 +9,14 @@ with np.load(sys.argv[1]) as file:
     points, cells = file["points"], file["cells"]
     layers = [file["element_sets/material 0"], file["element_sets/material 1"]]
     left, right = file["node_sets/left"], file["node_sets/right"]
+kind = {4: "quad", 8: "quad8n", 9: "quad9n"}[cells.shape[1]]
 ops.model("basic", "-ndm", 2, "-ndf", 2)
 for number, (x, y) in enumerate(points.tolist()):
     ops.node(number, x, y)
 for material, (young, ids) in enumerate(zip((1.0, 10.0), layers, strict=True), 1):
     ops.nDMaterial("ElasticIsotropic", material, young, 0.0)
     for cell in ids.tolist():
-        ops.element("quad", cell, *cells[cell].tolist(), 1.0, "PlaneStress", material)
+        ops.element(kind, cell, *cells[cell].tolist(), 1.0, "PlaneStress", material)
 pinned = int(left[np.argmin(points[left, 1])])
 for node in left.tolist():
     ops.fix(node, 1, int(node == pinned))
