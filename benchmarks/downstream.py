@@ -223,7 +223,7 @@ def version(run: Run) -> str:
     if run.debian:
         query = ["dpkg-query", "-W", "-f", "${Version}", run.debian]
         found = subprocess.run(query, capture_output=True, text=True)
-        return found.stdout.partition("-")[0].partition("+")[0] if found.returncode == 0 else ""
+        return found.stdout.rpartition(":")[2].partition("-")[0].partition("+")[0] if found.returncode == 0 else ""
     python = WORK / "venvs" / run.pip[0] / "bin" / "python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", python.parent.parent], check=True)
