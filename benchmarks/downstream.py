@@ -1,4 +1,4 @@
-"""Solve two layers in other people's programs, from our files; print the table of docs/fe/tools.md.
+"""Solve two layers in other people's programs, from our files; make the tables of docs/fe/tools.md.
 
 ``python benchmarks/downstream.py [NAME ...]``: programs that pip installs get a virtual environment each in
 ``/tmp/imgquad-downstream`` (kept for the next run), those of Debian must be there (``apt-get install`` them first);
@@ -19,6 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
+PAGE = Path(__file__).parents[1] / "docs" / "fe" / "tools.md"
+BEGIN, END = "<!-- made by benchmarks/downstream.py -->", "<!-- end -->"
 WORK = Path("/tmp/imgquad-downstream")
 #: built by hand from its source: it is in neither Debian nor PyPI
 ELMERGRID, ELMERGRID_VERSION = WORK / "elmergrid" / "ElmerGrid", "source of 2024-10-23"
@@ -137,20 +139,25 @@ RUNS = (
 
 
 def main() -> None:
-    """Print the table of runs, then which elements of order 2 each program took."""
+    """Print the rows of the programs asked for; of all, put them into docs/fe/tools.md."""
     asked = set(sys.argv[1:])
     WORK.mkdir(exist_ok=True)
     heads = ("program", "version", "file", "options", "materials", "borders", "result", "error")
-    print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
+    lines = [f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}"]
     took: dict[str, dict[str, str]] = {}
     for run in RUNS:
         if not asked or run.program in asked:
             cells = row(run)
-            print(f"| {' | '.join(cells)} |", flush=True)
+            lines.append(f"| {' | '.join(cells)} |")
+            print(lines[-1], flush=True)
             note_order(took.setdefault(run.program, {}), run, cells)
-    print("\n| program | 8 nodes | 9 nodes |\n|---|---|---|")
-    for program, answers in took.items():
-        print(f"| {program} | {answers.get('8', 'no file')} | {answers.get('9', 'no file')} |")
+    lines.append("\nOrder 2:\n\n| program | 8 nodes | 9 nodes |\n|---|---|---|")
+    lines += [f"| {program} | {got.get('8', 'no file')} | {got.get('9', 'no file')} |" for program, got in took.items()]
+    print(lines[-len(took) - 1], *lines[-len(took) :], sep="\n")
+    if not asked:
+        before, mark, rest = PAGE.read_text(encoding="utf-8").partition(f"{BEGIN}\n")
+        after = rest.partition(END)[2]
+        PAGE.write_text("\n".join([f"{before}{mark}", *lines, "", f"{END}{after}"]), encoding="utf-8")
 
 
 def note_order(answers: dict[str, str], run: Run, cells: list[str]) -> None:
@@ -186,6 +193,8 @@ def row(run: Run) -> list[str]:
                 f"{wrong}{name} {found:.7f}",
                 f"{error:.1e}",
             ]
+    if "empty" in values:
+        return [run.program, installed, *shown, "", "", f"**empty** {values['empty']}", ""]
     return [run.program, installed, *shown, "", "", f"{'refused' if run.refused else 'FAILS'}: {reason(said)}", ""]
 
 

@@ -7,7 +7,8 @@ from ngsolve import H1, BilinearForm, GridFunction, InnerProduct, Integrate, Mes
 
 mesh = Mesh(ReadGmsh(sys.argv[1]))
 if mesh.ne == 0 or mesh.dim != 2:
-    raise SystemExit(f"NGSolve read, without an error, {mesh.ne} volume elements in {mesh.dim} dimensions")
+    print("empty", f"without an error: {mesh.ne} volume elements in {mesh.dim} dimensions (our command warns)")
+    raise SystemExit(1)
 k = mesh.MaterialCF({"material_0": 1.0, "material_1": 10.0})
 space = H1(mesh, order=1, dirichlet="left|right")
 u, v = space.TnT()

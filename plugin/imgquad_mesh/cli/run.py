@@ -128,7 +128,7 @@ def mesh_to_files(
     now = perf_counter()
     seconds = {**run.seconds, "write": now - wrote, "total": now - start}
     report = outputs.build_report(run, image, to.mesh, seconds, min_quality)
-    report["notes"] += outputs.element_notes(made)
+    report["notes"] += outputs.element_notes(made, to.mesh, writing.options.get("version"))
     _write_others(run, to, report)
     if not quiet:
         cli.console.print_report(report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -136,3 +137,18 @@ def test_cohesive_elements_are_refused_before_anything_is_read(
 ) -> None:
     assert run(tmp_path / "there is no such picture.npy", "a.bdf", "--cohesive", "all") == 2
     assert "Nastran has no cohesive elements" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--order", "2", "--msh-version", "2.2"], True),
+        (["--order", "2"], False),
+        (["--msh-version", "2.2"], False),
+        (["--order", "2", "--nodes", "9", "--msh-version", "2.2"], False),
+    ],
+)
+def test_who_misreads_a_file_without_a_word_is_named(picture: Path, options: list[str], told: bool) -> None:
+    assert run(picture, "a.msh", *options, "--report", str(picture.parent / "a.json")) == 0
+    notes = json.loads((picture.parent / "a.json").read_text())["notes"]
+    assert any("NGSolve and FiPy take 8-node quads" in note for note in notes) == told
