@@ -89,7 +89,7 @@ def place_nodes(
     Parameters
     ----------
     curves : Curves
-        The chains.
+        The chains; `arc` is that along the smoothed ones.
     size, limit : float64, shape (n,)
         Wanted length of final edges at each dense point, and the asked one.
     is_corner : bool, shape (n,)
@@ -110,7 +110,7 @@ def place_nodes(
     n_nodes = 0
     for c in range(len(exact)):
         for i in range(curves.offsets[c] + 1, curves.offsets[c + 1]):
-            step = curves.arc[i] - curves.arc[i - 1]
+            step = max(curves.arc[i] - curves.arc[i - 1], 1e-9)
             cost[i] = cost[i - 1] + 2 * step / (size[i] + size[i - 1])
             n_nodes += 2
         n_nodes += 8 + int(cost[curves.offsets[c + 1] - 1]) * 2

@@ -18,7 +18,7 @@ from imgquad_core.geometry.conflicts import SHARP, UNITS, snapped
 from imgquad_core.model import Chains
 
 from .areas import mitres, restore_areas
-from .curves import Curves, Ends, per_point, pin_ends
+from .curves import Curves, Ends, arc_lengths, per_point, pin_ends
 from .edge_sizes import grade_along, grade_chains
 from .nodes import Level, Nodes, any_of_chain, even_out, level_of, mark_conflicts, number_nodes, place_nodes, points_at
 
@@ -115,7 +115,8 @@ def _place(draft: Draft, size: Floats, at_least: Ints, exact: Flags, withdrawn: 
     curves = draft.curves
     points = draft.smooth + withdrawn[:, None] * (curves.raw - draft.smooth)
     pin_ends(points, curves, _withdraw_ends(draft, withdrawn))
-    placed = place_nodes(curves, size, draft.limit, draft.is_corner, at_least, exact, draft.edge_multiple)
+    drawn = curves._replace(arc=arc_lengths(points, curves.offsets))  # stairs are up to 8 % longer
+    placed = place_nodes(drawn, size, draft.limit, draft.is_corner, at_least, exact, draft.edge_multiple)
     even_out(points, placed, exact, draft.edge_ratio)
     return number_nodes(curves, len(draft.node), snapped(points_at(points, placed.at), draft.units), placed)
 
