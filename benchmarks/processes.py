@@ -13,7 +13,7 @@ from typing import Any
 
 from PIL.Image import Resampling
 
-from imgquad_mesh.cli.rock_picture import rock_picture
+from imgquad_mesh.outputs.rock_picture import rock_picture
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from gmsh_routes import gmsh_mesh
 from imgquad_core import MeshOptions, QuadMesh, Run, run
 from imgquad_core.measures.quality import inner_nodes, quality_report, scaled_jacobian
-from imgquad_mesh.cli.rock_picture import PALETTE, rock_labels
+from imgquad_mesh.outputs.rock_picture import PALETTE, rock_labels
 
 COLORS = np.array(PALETTE) / 255
 

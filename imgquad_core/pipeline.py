@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,7 @@ from .picture import (
 from .reading import Calibration, Picture, ReadOptions, picture_of, read_picture, size_note
 
 Source: TypeAlias = "str | Path | NDArray[Any] | LabelImage | Picture"
+T = TypeVar("T")
 #: called with the name of the stage that starts, its number from 0, and the number of stages
 Progress: TypeAlias = Callable[[str, int, int], None]
 STAGES = ("read", "segment", "denoise", "absorb", "boundary", "smooth", "mesh")
@@ -130,6 +131,25 @@ class Run:
     notes: tuple[str, ...] = ()
 
 
+class Memory:
+    """What the stages of former runs gave: given again, not made, where a stage is asked for the same.
+
+    ``memory["clean"]`` is the value that the stage `clean` gave last; names are those of the fields of `Run`.
+    """
+
+    def __init__(self) -> None:
+        self._made: dict[str, tuple[tuple[Any, ...], Any]] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        return self._made[name][1]
+
+    def __call__(self, name: str, make: Callable[..., T], *of: Any) -> T:
+        """Return ``make(*of)``: from memory where the last one was made of equal options and the very same values."""
+        if name not in self._made or self._made[name][0] != of:
+            self._made[name] = of, make(*of)
+        return self[name]  # type: ignore[no-any-return]
+
+
 def mesh_image(image: Source, options: MeshOptions | None = None) -> QuadMesh:
     """Turn a picture into an all-quadrilateral mesh of its materials.
 
@@ -165,7 +185,12 @@ def mesh_image(image: Source, options: MeshOptions | None = None) -> QuadMesh:
     return run(image, options).mesh
 
 
-def run(source: Source | Segmentation, options: MeshOptions | None = None, progress: Progress | None = None) -> Run:
+def run(
+    source: Source | Segmentation,
+    options: MeshOptions | None = None,
+    progress: Progress | None = None,
+    memory: Memory | None = None,
+) -> Run:
     """Do what `mesh_image` does, and keep what the stages gave.
 
     Parameters
@@ -176,37 +201,40 @@ def run(source: Source | Segmentation, options: MeshOptions | None = None, progr
         As for `mesh_image`.
     progress : callable, optional
         Called as each stage starts.
+    memory : Memory, optional
+        Of former runs, whose values are taken where they are the same.
     """
+    made = Memory() if memory is None else memory
     options = MeshOptions() if options is None else options
     if not isinstance(options, MeshOptions):
         raise InputError(f"options is {options!r}: give a MeshOptions")
     ahead.start()
     timed = _Stopwatch(progress)
     raw = source if isinstance(source, Segmentation) else _read(source, options, timed)
-    found = raw if isinstance(raw, Segmentation) else _segmented(raw, options, timed)
+    found = raw if isinstance(raw, Segmentation) else _segmented(raw, options, timed, made)
     crop = None if isinstance(raw, Picture) and raw.window else options.crop  # what was read may be the part already
-    edited = edit_materials(found.image, options.editing())
-    picture = crop_image(edited, crop) if crop else edited
+    edited = made("edited", edit_materials, found.image, options.editing())
+    picture = made("picture", crop_image, edited, crop) if crop else edited
     calibration, notes = _what_the_file_says(raw, crop, options)
     options = options.placed(calibration, raw.name if isinstance(raw, Picture) else "the picture")
     with timed("denoise"):
-        step = step_of(picture, options)
+        step = made("step", step_of, picture, options.step, options.policy)
         noise = options.noise(found.quantised, found.image.shape).scaled(step)
-        clean = remove_noise(picture, noise)
+        clean = made("clean", remove_noise, picture, noise)
     with timed("absorb"):
-        absorbed = absorb_thin(clean, options.absorbing(picture.materials, noise.step))
-    labels = drop_materials(absorbed.image, options.drop)
+        absorbed = made("absorbed", absorb_thin, clean, options.absorbing(picture.materials, noise.step))
+    labels = made("labels", drop_materials, absorbed.image, options.drop)
     step = step[0] * absorbed.times, step[1] * absorbed.times
     smoothing, meshing = options.smoothing(picture.materials, step), options.meshing(picture.materials)
     true = true_shape(labels.shape, options.pixel_sides)
     _assert_feasible(true.shape, smoothing.size)
     with timed("boundary"):
         extraction = ExtractionOptions(options.policy, noise.step * absorbed.times)
-        staircase = extract_simplified(clean, absorbed, options.drop, extraction)
+        staircase = made("pixel_boundary", extract_simplified, clean, absorbed, options.drop, extraction)
     with timed("smooth"):
-        boundary = smooth(staircase, smoothing, true, options.periodic)
+        boundary = made("boundary", smooth, staircase, smoothing, true, options.periodic)
     with timed("mesh"):
-        boundary, mesh = fill_boundaries(boundary, meshing, labels.materials, options.periodic)
+        boundary, mesh = made("mesh", fill_boundaries, boundary, meshing, labels.materials, options.periodic)
     return Run(
         options=options,
         segmentation=found,
@@ -256,11 +284,9 @@ def extract(labels: LabelImage, options: ExtractionOptions | None = None) -> Bou
     return extract_boundaries(labels, options)
 
 
-def step_of(picture: LabelImage, options: MeshOptions) -> Step:
+def step_of(picture: LabelImage, step: Any, policy: str) -> Step:
     """Return width and height of the picture's data points: as asked for, or as seen."""
-    if options.step != "auto":
-        return as_step(options.step)
-    return find_step(extract(picture, ExtractionOptions(options.policy)))
+    return as_step(step) if step != "auto" else find_step(extract(picture, ExtractionOptions(policy)))
 
 
 def extract_simplified(
@@ -380,9 +406,9 @@ def _read(source: Source, options: MeshOptions, timed: _Stopwatch) -> Picture | 
         return read_source(source, options.reading())
 
 
-def _segmented(raw: Picture | LabelImage, options: MeshOptions, timed: _Stopwatch) -> Segmentation:
+def _segmented(raw: Picture | LabelImage, options: MeshOptions, timed: _Stopwatch, made: Memory) -> Segmentation:
     with timed("segment"):
-        return segment_source(raw, options.segmentation())
+        return made("segmentation", segment_source, raw, options.segmentation())
 
 
 def _what_the_file_says(

@@ -338,6 +338,21 @@ TEXTS: Mapping[str, Text] = {
 }
 
 
+def flag_of(name: str) -> str:
+    """Return the option of the command for a field."""
+    named = TEXTS[name].flag if name in TEXTS else ""
+    return f"--{named or name.replace('_', '-')}"
+
+
+def words_of(name: str, value: Any) -> list[str]:
+    """Return the words by which the command says the value of a field."""
+    if value is True:
+        return [flag_of(name)]
+    text = TEXTS[name].write(value) if name in TEXTS else str(value)
+    each = _items(text) if name in TEXTS and TEXTS[name].item else [text]
+    return [word for item in each for word in (flag_of(name), item)]
+
+
 def help_in_scripts(name: str, declaration: Declaration) -> str:
     """Return what filters.xml says of an option."""
     how = TEXTS[name].script if name in TEXTS else ""
@@ -364,17 +379,20 @@ def options_from(kind: type[T], spec: Filter, values: Mapping[str, Any]) -> T:
     given: dict[str, Any] = {}
     for parameter in spec.parameters:
         value = values.get(parameter.field, parameter.default)
-        given[parameter.field] = _read(parameter.name, parameter.field, value) if parameter.kind == "String" else value
+        given[parameter.field] = (
+            read_text(parameter.field, value, parameter.name) if parameter.kind == "String" else value
+        )
     return kind(**given)
 
 
-def _read(name: str, field: str, text: Value) -> Any:
+def read_text(field: str, text: Value, name: str = "") -> Any:
+    """Return the value of a field that a text says; `name` is what to call the field in errors."""
     if field not in TEXTS or not isinstance(text, str):
         return text
     try:
         return TEXTS[field].read(text.strip())
     except (argparse.ArgumentTypeError, ValueError) as error:
-        raise InputError(f"parameter {name} is {text!r}: {error}") from error
+        raise InputError(f"parameter {name or field} is {text!r}: {error}") from error
 
 
 def values_of(options: Any, spec: Filter) -> dict[str, Value]:

@@ -1,3 +1,3 @@
-from . import console, demo, list_filters, rock_picture, run, script, stack
+from . import console, demo, list_filters, run, script, stack, studio
 
-__all__ = ["console", "demo", "list_filters", "rock_picture", "run", "script", "stack"]
+__all__ = ["console", "demo", "list_filters", "run", "script", "stack", "studio"]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from imgquad_core.declared import Declaration, declarations
-from imgquad_mesh.texts import TEXTS, number
+from imgquad_mesh.texts import TEXTS, flag_of, number
 
 _READ: Mapping[type, Callable[[str], Any]] = {int: int, float: number, str: str}
 
@@ -30,12 +30,6 @@ def asked(args: argparse.Namespace, options: type) -> dict[str, Any]:
         for name, value in given.items()
         if value is not None
     }
-
-
-def flag_of(name: str) -> str:
-    """Return the option of the command for a field."""
-    named = TEXTS[name].flag if name in TEXTS else ""
-    return f"--{named or name.replace('_', '-')}"
 
 
 def form_of(name: str, declaration: Declaration) -> str:

@@ -266,7 +266,8 @@ def _rules(
     first = next(k for k, look in enumerate(looks) if not look.error)
     image = label_by(read_slice(slices[first], planes[first], options.reading()), legend, options.segmentation()).image
     noise = options.noise(legend.quantised, image.shape)
-    step = core.pipeline.step_of(crop_image(image, options.crop) if options.crop else image, options)
+    part = crop_image(image, options.crop) if options.crop else image
+    step = core.pipeline.step_of(part, options.step, options.policy)
     limits = {"min_pixels": noise.min_pixels, "min_length": noise.min_length, "step": list(step)}
     key = _key_of(looks, options)
     write_json({"key": key, "limits": limits, "legend": legend_as_json(legend)}, folder / "rules.json")

@@ -122,6 +122,7 @@ def files_of_steps(steps: Iterable[OwnStep | MeshLabStep], folder: Path) -> tupl
     written = [Path(str(value)) for _, kind, value in of_meshlab if kind == "RichSaveFile" and value]
     own = [step.options for step in steps if isinstance(step, OwnStep)]
     read += [Path(marks) for each in own if isinstance(marks := getattr(each, "marks", None), (str, Path))]
+    read += [script_path(given, folder) for each in own if (given := getattr(each, "properties", None))]
     names = [getattr(each, "file_name", None) for each in own]
     return read, written + [script_path(name, folder) for name in names if name]
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from imgquad_core import MeshOptions, pipeline
 from imgquad_core.boundary import ExtractionOptions, SmoothingOptions
 from imgquad_core.cleanup import OptimizationOptions, optimize
-from imgquad_core.declared import option, same_as
+from imgquad_core.declared import check, option, same_as
 from imgquad_core.errors import InputError
 from imgquad_core.fe import ElementOptions, fe_mesh
+from imgquad_core.fe.properties import read_properties
 from imgquad_core.measures import (
     aspect,
     corner_angles,
@@ -39,7 +40,7 @@ from imgquad_core.picture import (
     sizes_by_number,
     sizes_by_numbers,
 )
-from imgquad_mesh.outputs.files import check_target, mesh_extensions, write_labels, write_mesh_file
+from imgquad_mesh.outputs.files import check_target, mesh_extensions, write_labels, write_mesh_file, write_run
 
 from .crosscheck import boundary_lengths, material_perimeters
 from .layer import polyline
@@ -114,13 +115,30 @@ class MeshFileOptions:
     cohesive: str | tuple[tuple[str, str], ...] | None = same_as(ElementOptions, "cohesive")
     extrude: float | None = same_as(ElementOptions, "extrude")
     layers: int = same_as(ElementOptions, "layers")
+    periodic: str = same_as(
+        MeshOptions, "periodic", help="directions in which opposite nodes are tied, of a mesh that is periodic in them"
+    )
+    analysis: str = option(
+        "", "plane stress, plane strain, axisymmetric or heat, in files of Abaqus, Nastran and Ansys; empty: the first"
+    )
+    deck: str = option("", "tension or thermal: a model that CalculiX runs as it is, in .inp files; empty: the mesh")
+    properties: str = option("", "values of the materials, a TOML file in the script's folder or below; empty: none")
 
     def __post_init__(self) -> None:
+        check(self)
         self.elements()  # checks the values
 
     def elements(self) -> ElementOptions:
         """Return the elements that are asked for."""
-        return ElementOptions(self.order, self.nodes, self.cohesive, self.extrude, self.layers)
+        periodic = None if self.periodic == "none" else self.periodic
+        return ElementOptions(self.order, self.nodes, self.cohesive, self.extrude, self.layers, periodic)
+
+    def of_writer(self, folder: Path) -> dict[str, Any]:
+        """Return the options of the writer that are asked for."""
+        given: dict[str, Any] = {"analysis": self.analysis, "deck": self.deck}
+        if self.properties:
+            given["properties"] = read_properties(script_path(self.properties, folder))
+        return {name: value for name, value in given.items() if value}
 
 
 @dataclass(frozen=True)
@@ -228,6 +246,7 @@ def _mesh_boundary(state: State, options: MeshingOptions) -> dict[str, Any]:
 def _mesh_image(state: State, options: MeshOptions) -> dict[str, Any]:
     done = pipeline.run(state.labels if state.labels is not None else state.need_image(options.reading()), options)
     state.labels, state.pixel_boundary, state.boundary = done.labels, done.pixel_boundary, done.boundary
+    state.run = done
     state.put_mesh(done.mesh)
     return _size_of(done.mesh) | {"triangulator": triangulator_used(options.triangulator)}
 
@@ -320,7 +339,11 @@ def _list_sets(state: State, options: NoOptions) -> dict[str, Any]:
 
 def _save_mesh(state: State, options: MeshFileOptions) -> dict[str, Any]:
     path = script_path(options.file_name, state.folder)
-    write_mesh_file(state.mesh(), path, options.elements())
+    mesh, elements, of_writer = state.mesh(), options.elements(), options.of_writer(state.folder)
+    if state.run is not None and mesh is state.run.mesh:
+        write_run(state.run, path, elements, **of_writer)
+    else:
+        write_mesh_file(mesh, path, elements, **of_writer)
     return {"file": str(path)}
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from imgquad_core.errors import InputError
 from imgquad_core.measures.quality import quad_areas
 from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
+from imgquad_core.pipeline import Run
 from imgquad_core.reading.formats import ReadOptions
 from imgquad_mesh.datasets.pictures import read_any
 
@@ -100,6 +101,7 @@ class State:
     labels: LabelImage | None = None
     pixel_boundary: BoundaryGraph | None = None
     boundary: BoundaryGraph | None = None
+    run: Run | None = None  # that made a mesh, and knows pixel size and place
     made: dict[int, QuadMesh] = field(default_factory=dict)  # meshes of ours by the id of their layer
 
     def need_image(self, options: ReadOptions | None = None) -> Any:

@@ -13,6 +13,7 @@ from .files import (
 )
 from .mesh_picture import draw_materials, material_colors
 from .report import build_report, element_notes
+from .rock_picture import rock_picture
 
 __all__ = [
     "GRID_EXTENSIONS",
@@ -24,6 +25,7 @@ __all__ = [
     "material_colors",
     "mesh_extensions",
     "replace_file",
+    "rock_picture",
     "write_boundaries",
     "write_json",
     "write_labels",

@@ -47,14 +47,24 @@ def draw_materials(mesh: QuadMesh, path: Path) -> None:
 
 
 def material_colors(materials: Materials) -> NDArray[np.float64]:
-    """Return RGB from 0 to 1 of each material: the picture's own where they can be told apart, else others."""
+    """Return RGB from 0 to 1 of each material: its own where it can be told from all others, else one that can."""
     own = materials.colors.astype(int)
-    difference = np.abs(own[:, None] - own[None]).max(axis=2)
-    np.fill_diagonal(difference, 255)
-    if difference.min(initial=255) >= DISTINCT:
-        return own / 255
+    colors = own / 255
+    alike = _differences(own, own)
+    np.fill_diagonal(alike, 255)
+    lost = np.flatnonzero(alike.min(axis=1, initial=255) < DISTINCT)
     table = colormaps["tab20" if len(own) > 10 else "tab10"]
-    return np.array([table(i % table.N)[:3] for i in range(len(own))])
+    others = np.array([table(k)[:3] for k in range(table.N)])
+    kept = np.delete(own, lost, axis=0)
+    free = others[_differences(np.rint(others * 255).astype(int), kept).min(axis=1, initial=255) >= DISTINCT]
+    free = free if len(free) else others
+    colors[lost] = free[np.arange(len(lost)) % len(free)]
+    return np.asarray(colors)
+
+
+def _differences(some: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how far colours are apart, in the channel in which they are farthest: shape (n_some, n_others)."""
+    return np.asarray(np.abs(some[:, None] - others[None]).max(axis=2, initial=0))
 
 
 def _undated(path: Path) -> dict[str, Any]:

@@ -1,0 +1,93 @@
+"""Results as arrays that the page draws: positions in pixels of the picture, from its upper left corner, y down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imgquad_core.arrays import Floats, Labels
+from imgquad_core.measures import scaled_jacobian
+from imgquad_core.model import BoundaryGraph, LabelImage, Materials, QuadMesh
+
+Arrays = Mapping[str, NDArray[Any]]
+LARGEST = 4096  #: side of a texture that every WebGL 2 has
+
+
+def packed(arrays: Arrays) -> tuple[list[dict[str, Any]], bytes]:
+    """Return what stands where, and the bytes; each array begins at a multiple of four."""
+    listed, parts = [], []
+    for name, array in arrays.items():
+        data = np.ascontiguousarray(array).tobytes()
+        listed.append({"name": name, "type": array.dtype.name, "shape": list(array.shape), "bytes": len(data)})
+        parts.append(data + bytes(-len(data) % 4))
+    return listed, b"".join(parts)
+
+
+def label_places(labels: Labels, materials: Materials) -> NDArray[Any]:
+    """Return each pixel's place in the table of materials (the number behind the last: void), shrunk to a texture."""
+    step = -(-max(labels.shape) // LARGEST)
+    shown = labels[::step, ::step]
+    places = np.searchsorted(materials.labels, shown)
+    places = np.where(shown < 0, len(materials.labels), places)
+    return places.astype(np.uint8 if len(materials.labels) < 255 else np.uint16)
+
+
+def material_rows(image: LabelImage, shares: Mapping[int, float], colors: Floats) -> list[dict[str, Any]]:
+    """Return the table of materials, in the order of `label_places`."""
+    rows = zip(image.materials.labels.tolist(), image.materials.names, np.round(colors * 255).astype(int), strict=True)
+    return [
+        {"number": n, "name": name, "color": "#{:02x}{:02x}{:02x}".format(*color), "share": shares[n]}
+        for n, name, color in rows
+    ]
+
+
+class Frame:
+    """Where the meshed part lies on the picture: turns its coordinates into those of the page."""
+
+    def __init__(self, part: tuple[int, int], graph: tuple[int, int], crop: tuple[int, ...] | None) -> None:
+        self._height = graph[0]
+        self._scale = np.array([part[1] / graph[1], part[0] / graph[0]])
+        self._corner = np.array(crop[:2] if crop else (0, 0))
+
+    def __call__(self, points: Floats) -> NDArray[np.float32]:
+        """Return points (x right, y up) as the page has them."""
+        flipped = np.stack([points[:, 0], self._height - points[:, 1]], axis=1)
+        return np.asarray(flipped * self._scale + self._corner, np.float32)
+
+
+def pack_lines(graph: BoundaryGraph, frame: Frame) -> Arrays:
+    """Return both ends of each segment, shape (n, 4)."""
+    return {"lines": frame(graph.points)[graph.segments].reshape(-1, 4)}
+
+
+def pack_quads(mesh: QuadMesh, frame: Frame) -> Arrays:
+    """Return corners (n, 8), scaled Jacobians, places in the table of materials and numbers of quads.
+
+    Quads that lie together stand together, so that the page can leave out blocks of them that are not in view.
+    """
+    points = frame(mesh.points)
+    order = np.argsort(_morton(points[mesh.quads].mean(axis=1)), kind="stable")
+    quads = mesh.quads[order]
+    return {
+        "corners": points[quads].reshape(-1, 8),
+        "jacobians": scaled_jacobian(mesh.points, quads).astype(np.float32),
+        "places": np.searchsorted(mesh.materials.labels, mesh.quad_material[order]).astype(np.float32),
+        "quads": order.astype(np.uint32),
+    }
+
+
+def _morton(points: NDArray[np.float32]) -> NDArray[np.uint64]:
+    """Return the place of each point on the Z curve (Morton 1966)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    grid = ((points - low) / np.maximum(high - low, 1e-6) * 65535).astype(np.uint64)
+    return _spread(grid[:, 0]) | _spread(grid[:, 1]) << np.uint64(1)
+
+
+def _spread(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Put a zero behind each of 16 bits."""
+    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        bits = (bits | bits << np.uint64(shift)) & np.uint64(mask)
+    return bits

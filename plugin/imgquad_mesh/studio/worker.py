@@ -1,0 +1,277 @@
+"""A process that works for one page: it takes recipes from a pipe and answers with lines of JSON and arrays.
+
+A recipe says all, so a new worker in the place of a dead one needs no history; what takes long is kept in `Memory`.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from imgquad_core.errors import ImgquadError, InputError
+from imgquad_core.ledger import material_ledger
+from imgquad_core.measures import quality_report
+from imgquad_core.measures.quality import bad_places
+from imgquad_core.model import LabelImage, Materials
+from imgquad_core.options import MeshOptions
+from imgquad_core.picture import area_shares
+from imgquad_core.pipeline import STAGES, Memory, Run, run
+from imgquad_core.reading import Picture, ReadOptions
+from imgquad_mesh.outputs.files import mesh_extensions
+from imgquad_mesh.outputs.mesh_picture import material_colors
+
+from . import packing
+from .recipe import PROPERTIES, Recipe, recipe_of
+
+WORST, LOW = 12, 0.3  #: quads that the page lists, and the scaled Jacobian below which it tells whether they must be so
+Answer = tuple[dict[str, Any], bytes]
+Tell = Callable[[dict[str, Any]], None]
+
+
+@dataclass
+class Desk:
+    """What a worker has: its folder, the pixels it may read, and what it remembers of the picture."""
+
+    folder: Path
+    pixels: int
+    memory: Memory = field(default_factory=Memory)
+    raw: dict[tuple[str, ReadOptions], Picture] = field(default_factory=dict)
+
+    def picture(self, task: Mapping[str, Any], options: MeshOptions) -> Picture:
+        """Return the page's picture, read once; the last one only is kept."""
+        from imgquad_mesh.datasets.pictures import read_any
+
+        reading = replace(options.reading(), crop=None, max_pixels=self.pixels)
+        key = task["file"], reading
+        if key not in self.raw:
+            self.raw = {key: read_any(self.folder / task["file"], reading, task["name"])}
+        return self.raw[key]
+
+
+def work(pipe: Connection, folder: str, pixels: int, memory: int) -> None:
+    """Answer tasks until the pipe is closed."""
+    _limit_memory(memory)
+    desk = Desk(Path(folder), pixels)
+    while True:
+        try:
+            task = pipe.recv()
+        except EOFError:
+            return
+        _answer(desk, task, pipe)
+
+
+def _answer(desk: Desk, task: Mapping[str, Any], pipe: Connection) -> None:
+    def tell(line: dict[str, Any]) -> None:
+        pipe.send_bytes(json.dumps(line).encode())
+
+    try:
+        done, data = TASKS[task["do"]](desk, task, tell)
+    except MemoryError:
+        desk.memory, desk.raw = Memory(), {}
+        tell({"error": "out of memory: crop the picture, or ask for larger elements"})
+    except ImgquadError as error:
+        tell({"error": " ".join(str(error).split())})
+    except Exception:  # a bug: its text may hold what is none of the page's business
+        traceback.print_exc(file=sys.stderr)
+        tell({"error": "internal error, told in the terminal of the studio: please report it"})
+    else:
+        tell({"done": done, "bytes": len(data)})
+        if data:
+            pipe.send_bytes(data)
+
+
+class _Enough(Exception):
+    """The last stage that was asked for is done."""
+
+
+def _run(desk: Desk, task: Mapping[str, Any], tell: Tell, until: str) -> Run | None:
+    """Run the pipeline through a stage; None where it is not the last: the values are in the memory."""
+    recipe = _recipe(desk, task)
+
+    def progress(stage: str, number: int, total: int) -> None:
+        if number > STAGES.index(until):
+            raise _Enough
+        tell({"stage": stage, "number": number, "of": STAGES.index(until) + 1})
+
+    tell({"stage": "read", "number": 0, "of": STAGES.index(until) + 1})
+    try:
+        return run(desk.picture(task, recipe.options), recipe.options, progress, desk.memory)
+    except _Enough:
+        return None
+
+
+def _recipe(desk: Desk, task: Mapping[str, Any]) -> Recipe:
+    recipe = recipe_of(task["recipe"])
+    if recipe.options.marks is None:
+        return recipe
+    if not task.get("marks"):
+        raise InputError("there are no marks: paint on the picture")
+    return replace(recipe, options=replace(recipe.options, marks=desk.folder / task["marks"]))
+
+
+def _segment(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
+    _run(desk, task, tell, "segment")
+    found, edited = desk.memory["segmentation"], desk.memory["edited"]
+    listed, data = packing.packed({"labels": packing.label_places(edited.labels, edited.materials)})
+    rows, cols = edited.shape
+    told = {"note": found.note, "warnings": list(found.warnings), "rows": rows, "columns": cols}
+    told["formats"] = list(mesh_extensions())
+    told["notes"] = list(desk.picture(task, recipe_of(task["recipe"]).options).notes)
+    return told | {"base": _base(found.image.materials), "materials": _table(edited), "arrays": listed}, data
+
+
+def _base(materials: Materials) -> dict[str, str]:
+    return {str(n): name for n, name in zip(materials.labels.tolist(), materials.names, strict=True)}
+
+
+def _table(image: LabelImage) -> list[dict[str, Any]]:
+    return packing.material_rows(image, area_shares(image), material_colors(image.materials))
+
+
+def _denoise(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
+    from imgquad_core.picture import list_removed
+
+    _run(desk, task, tell, "denoise")
+    recipe, clean, found = recipe_of(task["recipe"]), desk.memory["clean"], desk.memory["segmentation"]
+    before = desk.memory["picture"] if recipe.options.crop else desk.memory["edited"]
+    limits = recipe.options.noise(found.quantised, found.image.shape).scaled(desk.memory["step"])
+    removed = list_removed(before, clean, limits.policy, limits.step)
+    listed, data = packing.packed({"labels": packing.label_places(clean.labels, clean.materials)})
+    told = {"min_pixels": limits.min_pixels, "min_length": limits.min_length, "rows": clean.shape[0]}
+    told |= {"clusters": sum(r.clusters for r in removed), "pixels": sum(r.pixels for r in removed)}
+    return told | {"columns": clean.shape[1], "arrays": listed}, data
+
+
+def _smooth(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
+    _run(desk, task, tell, "smooth")
+    graph, part = desk.memory["boundary"], desk.memory["labels"].shape
+    frame = packing.Frame(part, graph.shape, recipe_of(task["recipe"]).options.crop)
+    listed, data = packing.packed(packing.pack_lines(graph, frame))
+    return {"chains": graph.n_chains, "regions": len(graph.region_label), "arrays": listed}, data
+
+
+def _mesh(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
+    done = _run(desk, task, tell, "mesh")
+    assert done is not None
+    frame = packing.Frame(done.labels.shape, done.boundary.shape, done.options.crop)
+    arrays = packing.pack_quads(done.pixel_mesh, frame)
+    listed, data = packing.packed(arrays)
+    quality = quality_report(done.mesh)
+    ledger = material_ledger(done.picture, done.labels, done.boundary, done.mesh, done.options.pixel_sides)
+    told = {"quality": asdict(quality), "worst": _worst(done), "arrays": listed, "materials": _table(done.labels)}
+    return told | {"errors": {row.name: row.error for row in ledger if row.clean_pixels}}, data
+
+
+def _worst(done: Run) -> list[dict[str, Any]]:
+    names = done.mesh.materials.name_of
+    return [
+        {"quad": place.quad, "forced": place.forced, "angle": place.sector_angle, "material": names(place.material)}
+        for place in bad_places(done.pixel_mesh, LOW, WORST)
+    ]
+
+
+def _write(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
+    """Write one of the outputs of the command and hand over what was written."""
+    from imgquad_core.writers.neighbours import files_of
+    from imgquad_mesh.outputs import files
+
+    start = perf_counter()
+    done = _run(desk, task, tell, "mesh")
+    assert done is not None
+    tell({"stage": "write", "number": 1, "of": 1})
+    recipe, what = recipe_of(task["recipe"]), task["what"]
+    folder = desk.folder / "out"
+    folder.mkdir(exist_ok=True)
+    stem = Path(recipe.picture).stem
+    path = folder / (recipe.file if what == "mesh" else f"{stem}{_OTHERS[what]}")
+    if what == "mesh":
+        files.check_target(path, files.mesh_extensions())
+        files.write_run(done, path, recipe.output.elements, **_writer_options(recipe, folder))
+    elif what == "report":
+        from imgquad_mesh.outputs.report import build_report
+
+        seconds = {**done.seconds, "total": perf_counter() - start}
+        files.write_json(build_report(done, Path(recipe.picture), Path(recipe.file), seconds), path)
+    elif what == "picture":
+        files.write_picture(done.mesh, path)
+    else:
+        files.write_labels(done.labels, path)
+    return _handed_over([each for each in files_of(path) if each.exists()])
+
+
+#: endings of what is written beside the mesh
+_OTHERS = {"report": ".report.json", "picture": ".mesh.png", "labels": ".labels.npy", "labels_png": ".labels.png"}
+
+
+def _writer_options(recipe: Recipe, folder: Path) -> dict[str, Any]:
+    from imgquad_core.fe.properties import read_properties
+
+    given: dict[str, Any] = dict(recipe.output.writer)
+    if recipe.output.properties:
+        (folder / PROPERTIES).write_text(recipe.output.properties, encoding="utf-8")
+        given["properties"] = read_properties(folder / PROPERTIES)
+    return given
+
+
+def _handed_over(paths: list[Path]) -> Answer:
+    parts = [path.read_bytes() for path in paths]
+    for path in paths:
+        path.unlink()
+    listed = [{"name": path.name, "bytes": len(part)} for path, part in zip(paths, parts, strict=True)]
+    return {"files": listed}, b"".join(parts)
+
+
+def _look(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
+    """Show a picture that browsers cannot: its values from black to white, as PNG."""
+    from PIL import Image
+
+    picture = desk.picture(task, recipe_of(task["recipe"]).options)
+    step = -(-max(picture.shape) // packing.LARGEST)
+    values = picture.values[::step, ::step]
+    if picture.palette is not None:
+        values = picture.palette[values]
+    if values.dtype != np.uint8:
+        low, high = np.quantile(values.astype(np.float64), (0.001, 0.999))
+        values = np.clip((values - low) / max(high - low, 1e-30) * 255, 0, 255).astype(np.uint8)
+    out = io.BytesIO()
+    Image.fromarray(values).save(out, "PNG", compress_level=1)
+    return {"files": [{"name": "look.png", "bytes": out.tell()}]}, out.getvalue()
+
+
+def _rock(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
+    """Draw the rock of the demo."""
+    from imgquad_mesh.outputs.rock_picture import rock_picture
+
+    out = io.BytesIO()
+    rock_picture().save(out, "PNG")
+    return {"files": [{"name": "rock.png", "bytes": out.tell()}]}, out.getvalue()
+
+
+TASKS: Mapping[str, Callable[[Desk, Mapping[str, Any], Tell], Answer]] = {
+    "segment": _segment,
+    "denoise": _denoise,
+    "smooth": _smooth,
+    "mesh": _mesh,
+    "write": _write,
+    "look": _look,
+    "rock": _rock,
+}
+
+
+def _limit_memory(bytes_: int) -> None:
+    """Let the process have so much data, so that too large a picture is a `MemoryError` and not the machine's end."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    resource.setrlimit(resource.RLIMIT_DATA, (bytes_, bytes_))
