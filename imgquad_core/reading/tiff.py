@@ -101,7 +101,7 @@ def _chosen(path: Path, file: Any, options: ReadOptions) -> Plane:
     """Return the page that the options ask for, or the only one there is."""
     if file.is_ome or file.is_imagej:
         return _of_series(path, file.series[0], options)
-    every = [page.aspage() for page in (file.series[0].pages if file.is_svs else file.pages)]
+    every = list(_each_page(path, file.series[0].pages if file.is_svs else file.pages))
     full = [page for page in every if not page.is_reduced and not _is_mask(page)] or every
     stack = Stack(str(path), (("frame", len(full)),))
     page = full[stack.choose(options).get("frame", 0)]
@@ -110,6 +110,16 @@ def _chosen(path: Path, file: Any, options: ReadOptions) -> Plane:
     if options.level:
         return _coarser(path, file, every, page, options)
     return Plane(page, next((mask for mask in every if _masks(mask, page)), None), channel=options.channel)
+
+
+def _each_page(path: Path, pages: Any) -> Iterator[Any]:
+    """Return the pages; of a damaged file they may come again and again, which tifffile sees at the hundredth only."""
+    seen: set[int] = set()
+    for page in pages:
+        if page.offset in seen:
+            raise InputError(f"{path} is damaged, its pages go round in a circle: save it anew")
+        seen.add(page.offset)
+        yield page.aspage()
 
 
 def _is_mask(page: Any) -> bool:

@@ -67,8 +67,8 @@ def _merges(text: str) -> dict[tuple[str, ...], str]:
     return dict(merge(item) for item in _items(text))
 
 
-def _write_merges(merges: Mapping[Any, str]) -> str:
-    return _joined(f"{_joined(map(str, names))}={name}" for names, name in merges.items())
+def _write_merges(merges: Mapping[Any, str] | None) -> str:
+    return _joined(f"{_joined(map(str, names))}={name}" for names, name in (merges or {}).items())
 
 
 def _renames(text: str) -> dict[str, str]:
@@ -79,8 +79,12 @@ def _recolors(text: str) -> dict[str, tuple[int, int, int]]:
     return dict(recolor(item) for item in _items(text))
 
 
-def _write_recolors(colors: Mapping[Any, Any]) -> str:
-    return _joined(f"{name}={_write_colors([color])}" for name, color in colors.items())
+def _write_names(names: Mapping[Any, str] | None) -> str:
+    return _joined(f"{each}={name}" for each, name in (names or {}).items())
+
+
+def _write_recolors(colors: Mapping[Any, Any] | None) -> str:
+    return _joined(f"{name}={_write_colors([color])}" for name, color in (colors or {}).items())
 
 
 def _cohesive(text: str) -> str | tuple[tuple[str, str], ...] | None:
@@ -256,7 +260,7 @@ TEXTS: Mapping[str, Text] = {
     ),
     "rename": Text(
         _renames,
-        lambda names: _joined(f"{each}={name}" for each, name in names.items()),
+        _write_names,
         "MATERIAL=NAME",
         f"Written grey_87=quartz,7=mica; {_QUOTED} with its new name.",
         "rename",

@@ -319,6 +319,9 @@ def test_wheel_has_filters_xml(tmp_path: Path) -> None:
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True, timeout=120)
     with zipfile.ZipFile(next(tmp_path.glob("*.whl"))) as wheel:
         assert wheel.read("imgquad_mesh/filters.xml") == (ROOT / "filters.xml").read_bytes()
+        page = ROOT / "plugin/imgquad_mesh/studio/www"
+        for file in page.iterdir():
+            assert wheel.read(f"imgquad_mesh/studio/www/{file.name}") == file.read_bytes()
 
 
 def test_filters_are_found_in_a_checkout() -> None:

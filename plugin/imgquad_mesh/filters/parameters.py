@@ -126,7 +126,14 @@ def _new_names(value: Any, name: str) -> dict[str | int, str]:
 
 
 def _new_colors(value: Any, name: str) -> dict[str | int, tuple[int, ...]]:
-    return {_material(key, name): pv.Color(color).int_rgb for key, color in _mapping(value, name).items()}
+    return {_material(key, name): _rgb(color, f"{name}[{key!r}]") for key, color in _mapping(value, name).items()}
+
+
+def _rgb(value: Any, name: str) -> tuple[int, ...]:
+    try:
+        return tuple(pv.Color(value).int_rgb)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} is {value!r}, which is no colour; give a name, '#rrggbb' or R, G, B") from error
 
 
 def _mapping(value: Any, name: str) -> Mapping[Any, Any]:

@@ -15,7 +15,7 @@ from typing import Any
 
 from starlette.applications import Starlette
 from starlette.datastructures import MutableHeaders
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -241,6 +241,8 @@ def _told(answer: Answering) -> Answering:
     async def told(request: Request) -> Response:
         try:
             return await answer(request)
+        except ClientDisconnect:
+            return _no(499, "the page went away")
         except TooMuch as error:
             return _no(error.code, str(error))
         except Busy as error:

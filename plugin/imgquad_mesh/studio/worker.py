@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import sys
 import traceback
 from collections.abc import Callable, Mapping
@@ -54,8 +55,19 @@ class Desk:
         reading = replace(options.reading(), crop=None, max_pixels=self.pixels)
         key = task["file"], reading
         if key not in self.raw:
+            _assert_whole(self.folder / task["file"], task["name"])
             self.raw = {key: read_any(self.folder / task["file"], reading, task["name"])}
         return self.raw[key]
+
+
+#: how headers name the file of their data; an upload has none beside it, and must not reach for others
+_ELSEWHERE = {".nrrd": rb"(?im)^data ?file *:", ".mha": rb"(?im)^ElementDataFile *= *(?!LOCAL)"}
+
+
+def _assert_whole(path: Path, name: str) -> None:
+    pattern = _ELSEWHERE.get(path.suffix)
+    if pattern and re.search(pattern, path.read_bytes()[:100_000].split(b"\n\n")[0]):
+        raise InputError(f"{name} names another file for its data: give one that holds all")
 
 
 def work(pipe: Connection, folder: str, pixels: int, memory: int) -> None:

@@ -104,7 +104,7 @@ BAD_OPTIONS = {
     "merge without a name": (["--merge", "1,3"], "A,B=NAME"),
     "merge of an unknown material": (["--merge", "1,7=a"], "'7'"),
     "rename without a name": (["--rename", "3="], "MATERIAL=NAME"),
-    "rename to a name that is taken": (["--rename", "3=1"], "as material 1 is"),
+    "rename to a name that is taken": (["--rename", "3=material 1"], "as material 1 is"),
     "recolor without a colour": (["--recolor", "3=red"], "#rrggbb"),
     "all dropped": (["--drop", "1", "--drop", "3"], "no pixel is left"),
     "colors": (["--colors", "many"], "many"),
