@@ -77,9 +77,14 @@ def grid_of(shape: tuple[int, int], tile: int, keep: int, size: float) -> Grid:
     size : float
         Largest edge length, px.
     """
-    least = max(int(2 * (BAND + CORNER) * size) + 1, 2 * keep + 1)
+    least = least_tile(keep, size)
     if tile < least:
         raise InputError(f"tile is {tile}: elements of {size:g} px and keep-whole = {keep} need {least} or more")
     if keep < 0:
         raise InputError(f"keep-whole is {keep}: give 0 or more pixels")
     return Grid(shape, tile, keep)
+
+
+def least_tile(keep: int, size: float) -> int:
+    """Return the least side of tiles: bands of one round must not meet, nor faces of tiles that are not neighbours."""
+    return max(int(2 * (BAND + CORNER) * size) + 1, 2 * keep + 1)

@@ -36,7 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
-    for command in (cli.run, cli.stack, cli.demo, cli.studio, cli.script, cli.list_filters):
+    for command in (cli.run, cli.stack, cli.tiles, cli.demo, cli.studio, cli.script, cli.list_filters):
         command.add_parser(subparsers)
     return parser
 

@@ -40,7 +40,7 @@ def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, int, int], None]]:
 
 
 @contextmanager
-def counting_if(wanted: bool, expected: Mapping[str, int]) -> Iterator[Callable[[str], None]]:
+def counting_if(wanted: bool, expected: Mapping[str, int | None]) -> Iterator[Callable[[str], None]]:
     """Give a function to call with the kind of each step that ends; it draws a bar a kind of those expected."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from imgquad_core.reading import Picture
 from imgquad_mesh.outputs.files import write_json
 
 PLAN = "plan.json"
+WRITTEN, FOLDERS = (".vtu", ".json", ".pvtu", ".vtkhdf"), ("work", "mesh")  #: what runs leave in their folder
 
 
 def start_plan(folder: Path, plan: Mapping[str, Any], restart: bool) -> None:
@@ -71,8 +73,10 @@ def _short(value: Any) -> str:
 
 def _clear(folder: Path) -> None:
     """Remove what runs write: the plan last."""
+    for name in FOLDERS:
+        shutil.rmtree(folder / name, ignore_errors=True)
     for path in sorted(folder.glob("*.*")):
-        if path.is_file() and path.suffix in (".vtu", ".json", ".npy", ".npz") and path.name != PLAN:
+        if path.is_file() and path.suffix in WRITTEN and path.name != PLAN:
             path.unlink()
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,23 +20,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import imgquad_core as core
 from imgquad_core.errors import ImgquadError, InputError
 from imgquad_core.options import MeshOptions
-from imgquad_core.picture import Legend, counts_labels, crop_image, label_by, legend_of, sample_of, tally_labels
+from imgquad_core.picture import counts_labels, crop_image, label_by, legend_of, sample_of, tally_labels
 from imgquad_core.reading import Picture
 from imgquad_core.reading.picture import part_of
+from imgquad_core.tiles import Rules, legend_as_json, load_rules, rules_of, save_rules
+from imgquad_core.tiles.sources import MOST_SAMPLED, SPREAD, WINDOWS
 from imgquad_mesh.outputs.files import check_target, replace_file, write_json
 
 from .cluster import opened, run_steps
 from .graph import Failed, Result, Step, Told, as_delayed
-from .legends import legend_as_json, legend_from_json
 from .plan import digest_of, digest_of_text, options_as_json, start_plan
 from .slices import Slice, read_slice, slices_of
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-MOST_SAMPLED = 1 << 24  #: pixels that a sample has
-MOST_WINDOWS = 64  #: that it is made of, if all slices have more pixels than that
-_STEPS = (0.7548776662466927, 0.5698402909980532)  # of places that fill a square evenly (R2, the plastic number)
+RULES = "rules.json"
 
 
 @dataclass(frozen=True)
@@ -177,13 +176,6 @@ class Sampled(NamedTuple):
     most: int
 
 
-class Rules(NamedTuple):
-    """What holds for all slices."""
-
-    legend: Legend
-    options: MeshOptions  #: with the limits of noise and the width of data points as numbers
-
-
 def _steps(
     slices: Sequence[Slice], planes: Sequence[Any], options: MeshOptions, spacing: float, folder: Path
 ) -> Iterator[Step]:
@@ -212,7 +204,7 @@ def _look(which: Slice, plane: Any, options: MeshOptions) -> Look:
 def _sample(
     slices: Sequence[Slice], planes: list[Any], looks: list[Look], options: MeshOptions, folder: Path
 ) -> Sampled:
-    if _rules_in(folder, looks, options) is not None:
+    if load_rules(folder / RULES, _key_of(looks, options), options) is not None:
         return Sampled(None, 0)
     good = [k for k, look in enumerate(looks) if not look.error]
     if not good:
@@ -227,14 +219,14 @@ def _boxes(shapes: Sequence[tuple[int, int]]) -> dict[int, tuple[int, int, int, 
     """Return the part of each slice that belongs to the sample: all of it, or windows evenly spread in the stack."""
     if sum(rows * cols for rows, cols in shapes) <= MOST_SAMPLED:
         return {k: (0, 0, cols, rows) for k, (rows, cols) in enumerate(shapes)}
-    n = min(len(shapes), MOST_WINDOWS)
+    n = min(len(shapes), WINDOWS)
     side = int((MOST_SAMPLED // n) ** 0.5)
     boxes = {}
     for i in range(n):
         k = i * len(shapes) // n
         height, width = (min(side, length) for length in shapes[k])
         top, left = (
-            int((0.5 + i * _STEPS[axis]) % 1.0 * (shapes[k][axis] - (height, width)[axis] + 1)) for axis in (0, 1)
+            int((0.5 + i * SPREAD[axis]) % 1.0 * (shapes[k][axis] - (height, width)[axis] + 1)) for axis in (0, 1)
         )
         boxes[k] = (left, top, left + width, top + height)
     return boxes
@@ -258,35 +250,16 @@ def _rules(
 ) -> Rules:
     """Decide what holds for all slices, and write it down."""
     if sampled.sample is None:
-        found = _rules_in(folder, looks, options)
+        found = load_rules(folder / RULES, _key_of(looks, options), options)
         assert found is not None
         return found
     counted = [tally for tally in tallies if tally != ""] if sampled.most else []
     legend = legend_of(sampled.sample, counted, options.segmentation())
     first = next(k for k, look in enumerate(looks) if not look.error)
     image = label_by(read_slice(slices[first], planes[first], options.reading()), legend, options.segmentation()).image
-    noise = options.noise(legend.quantised, image.shape)
-    part = crop_image(image, options.crop) if options.crop else image
-    step = core.pipeline.step_of(part, options.step, options.policy)
-    limits = {"min_pixels": noise.min_pixels, "min_length": noise.min_length, "step": list(step)}
-    key = _key_of(looks, options)
-    write_json({"key": key, "limits": limits, "legend": legend_as_json(legend)}, folder / "rules.json")
-    return Rules(legend, _with_limits(options, limits))
-
-
-def _with_limits(options: MeshOptions, limits: Mapping[str, Any]) -> MeshOptions:
-    return replace(options, **dict(limits) | {"step": tuple(limits["step"])})
-
-
-def _rules_in(folder: Path, looks: list[Look], options: MeshOptions) -> Rules | None:
-    """Return the rules that a run before this one decided for the same slices and options."""
-    try:
-        found = json.loads((folder / "rules.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    if found["key"] != _key_of(looks, options):
-        return None
-    return Rules(legend_from_json(found["legend"]), _with_limits(options, found["limits"]))
+    rules = rules_of(legend, crop_image(image, options.crop) if options.crop else image, image.shape, options)
+    save_rules(folder / RULES, _key_of(looks, options), rules)
+    return rules
 
 
 def _key_of(looks: list[Look], options: MeshOptions) -> str:
