@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,22 +29,6 @@ def slice_labels(k: int) -> np.ndarray:
     labels = (np.hypot(x - 15 - 5 * k, y - 20) < 9).astype(np.uint8)
     labels[30:38, 2:12] = 2 if k == 2 else 0
     return labels
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[Any]:
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
-    ) as cluster:
-        yield cluster
-
-
-@pytest.fixture
-def client(cluster: Any) -> Iterator[Any]:
-    distributed = pytest.importorskip("distributed")
-    with distributed.Client(cluster) as client:
-        yield client
 
 
 @pytest.fixture

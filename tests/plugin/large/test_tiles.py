@@ -1,0 +1,233 @@
+"""Tiles: one conforming mesh, whoever does the work and however often it is stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from imgquad_core import MeshOptions
+from imgquad_core.errors import InputError
+from imgquad_core.measures.quality import scaled_jacobian
+from imgquad_core.tiles import tasks
+from imgquad_mesh.__main__ import main
+from imgquad_mesh.large import TiledMesh, mesh_tiles
+from support.invariants import assert_valid_mesh
+from support.labels import label_image
+
+OPTIONS = MeshOptions(size=4.0)
+TILE, KEEP = 448, 100
+SHAPE = (500, 910)  # 2 x 3 tiles, the last ones of 52 rows and 14 columns
+
+
+def drawn_labels() -> np.ndarray:
+    """A matrix with discs that stay whole, some across tile lines, a vein that is cut, and one pixel at a corner."""
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]] + 0.5
+    labels = np.zeros(SHAPE, np.uint8)
+    rng = np.random.default_rng(3)
+    for _ in range(30):
+        cx, cy, radius = rng.uniform(0, SHAPE[1]), rng.uniform(0, SHAPE[0]), rng.uniform(8, 40)
+        labels[np.hypot(x - cx, y - cy) < radius] = 1
+    labels[np.abs(y - 300 - 60 * np.sin(x / 90)) < 7] = 2
+    labels[np.hypot(x - 448, y - 448) < 20] = 3
+    labels[0, 0] = 4
+    return labels
+
+
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("tiles") / "big.npy"
+    np.save(path, drawn_labels())
+    return path
+
+
+@pytest.fixture(scope="module")
+def made(picture: Path) -> TiledMesh:
+    return meshed(picture, picture.parent / "out")
+
+
+def meshed(source: Any, folder: Path, **options: Any) -> Any:
+    return mesh_tiles(source, folder, options.pop("how", OPTIONS), tile=TILE, keep_whole=KEEP, **options)
+
+
+def digests(folder: Path) -> dict[str, str]:
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.glob("mesh/*.vtu"))}
+
+
+def test_the_whole_is_one_conforming_mesh_of_all_materials(made: TiledMesh) -> None:
+    grid = pv.read(made.path)
+    whole = grid.clean(tolerance=0)
+    nodes = np.unique(grid.point_data["node"])
+    assert np.array_equal(nodes, np.arange(whole.n_points))  # numbers and places tell the same nodes
+    quads = whole.cells.reshape(-1, 5)[:, 1:]
+    points = np.asarray(whole.points)[:, :2]
+    assert len(quads) == made.report["quality"]["n_quads"]
+    assert scaled_jacobian(points, quads).min() == pytest.approx(made.report["quality"]["min_sj"])
+    assert made.report["quality"]["min_sj"] > 0.3
+    edges = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    edges, count = np.unique(edges, axis=0, return_counts=True)
+    assert count.max() == 2
+    assert len(points) - len(edges) + len(quads) == 1  # Euler: no hole, no crack
+    x, y = points[edges[count == 1]].mean(axis=1).T
+    assert (((x == 0) | (x == SHAPE[1])) | ((y == 0) | (y == SHAPE[0]))).all()
+    labels = drawn_labels()
+    assert np.array_equal(np.unique(whole.cell_data["material"]), np.unique(labels))
+    assert whole.area == pytest.approx(labels.size, rel=1e-12)
+    for row in made.report["materials"]:
+        pixels = np.count_nonzero(labels == row["material"])
+        assert row["pixels"] == row["clean_pixels"] == pixels
+        assert row["mesh_area"] == pytest.approx(pixels, abs=max(1.0, 1e-4 * pixels))
+
+
+def test_the_whole_passes_as_a_mesh_of_the_picture(made: TiledMesh) -> None:
+    assert_valid_mesh(made.mesh(), label_image(drawn_labels().astype(np.int32)))
+
+
+def test_seams_are_cleaned_up(made: TiledMesh) -> None:
+    """Near former seams there are hardly more irregular nodes than elsewhere, and no straight row of nodes is left."""
+    mesh = made.mesh()
+    inner = (mesh.point_kind == 4) & (mesh.quad_material[0] >= 0)
+    x, y = mesh.points.T
+    near = (np.abs(x - TILE) < 40) | (np.abs(y - (SHAPE[0] - TILE)) < 40)
+    irregular = mesh.valence != 4
+    assert irregular[inner & near].mean() <= 1.6 * irregular[inner & ~near].mean()
+    on_line = inner & (np.abs(x - TILE) < 1e-6)
+    assert on_line.sum() < 0.2 * SHAPE[0] / 4
+
+
+def test_regions_keep_their_areas_and_small_ones_stay_whole(made: TiledMesh) -> None:
+    regions = made.report["regions"]
+    assert regions["worst_error"] < 2e-3
+    assert regions["worst_error_of_very_large"] < 1e-4
+    grid = pv.read(made.path)
+    tile, region = grid.cell_data["tile"], grid.cell_data["region"]
+    of = np.unique(np.stack([region, tile]), axis=1)[0]
+    assert 0 < regions["cut"] < 8
+    assert np.count_nonzero(np.bincount(of) > 1) <= regions["cut"]  # only these are in several tiles
+
+
+def test_same_bytes_on_two_workers_from_zarr_and_from_dask(
+    client: Any, picture: Path, made: TiledMesh, tmp_path: Path
+) -> None:
+    da = pytest.importorskip("dask.array")
+    array = da.from_array(np.load(picture), chunks=(300, 300))
+    tasks_of = meshed(array, tmp_path / "dask", compute=False)
+    assert not (tmp_path / "dask" / "mesh.pvtu").exists()
+    lazy = tasks_of.compute(scheduler=client)
+    assert digests(tmp_path / "dask") == digests(made.path.parent)
+    assert lazy.report["quality"] == made.report["quality"]
+
+
+def _kill_once(flag: str) -> None:
+    if not Path(flag).exists():
+        Path(flag).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_same_bytes_after_a_kill_a_full_disk_and_lost_files(
+    client: Any, picture: Path, made: TiledMesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save = tasks.save_arrays
+
+    def full(path: Path, **arrays: Any) -> None:
+        if path.name == "mesh-1.npz":
+            raise InputError("cannot write mesh-1.npz: No space left on device")
+        save(path, **arrays)
+
+    monkeypatch.setattr(tasks, "save_arrays", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        meshed(picture, tmp_path / "out", client=None)
+    monkeypatch.undo()
+    work = tmp_path / "out" / "work"
+    kept = {path.name: path.stat().st_mtime_ns for path in work.glob("outlines-*.npz")}
+    assert len(kept) == 6
+    assert not (work / "mesh-1.npz").exists()
+    for path in (work / "outlines-3.npz", work / "ids-0.npy"):
+        path.unlink()
+    # a worker dies in the middle of the second run
+    client.submit(_kill_once, str(tmp_path / "flag"), key=f"kill-{tmp_path}")
+    meshed(picture, tmp_path / "out", client=client)
+    assert digests(tmp_path / "out") == digests(made.path.parent)
+    later = {path.name: path.stat().st_mtime_ns for path in work.glob("outlines-*.npz")}
+    assert {name for name in kept if later[name] != kept[name]} == {"outlines-3.npz"}
+
+
+def test_another_plan_and_a_changed_picture_are_refused(picture: Path, made: TiledMesh, tmp_path: Path) -> None:
+    folder = made.path.parent
+    before = digests(folder)
+    with pytest.raises(InputError, match=r"size.*--restart"):
+        meshed(picture, folder, how=MeshOptions(size=3.0))
+    with pytest.raises(InputError, match="tile = 448, not 500"):
+        mesh_tiles(picture, folder, OPTIONS, tile=500, keep_whole=KEEP)
+    copy = tmp_path / "copy.npy"
+    copy.write_bytes(picture.read_bytes())
+    with pytest.raises(InputError, match="begun with source"):
+        meshed(copy, folder)
+    assert digests(folder) == before
+
+
+def test_tiles_and_boxes_are_read_when_they_are_asked_for(made: TiledMesh) -> None:
+    tile = made[0, 1]
+    assert tile.n_quads == made.report["tiles"][1]["quads"]
+    part = made.box(400, 200, 700, 480)
+    centre = part.points[part.quads].mean(axis=1)
+    assert centre[:, 0].min() >= 400
+    assert centre[:, 0].max() < 700
+    assert centre[:, 1].min() > SHAPE[0] - 480
+    assert set(part.materials.names) == {f"material {k}" for k in range(5)}
+    with pytest.raises(InputError, match="2 rows of 3 tiles"):
+        made[2, 0]
+
+
+def test_command_writes_partitions_and_a_deck(
+    picture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    meshio = pytest.importorskip("meshio")
+    pytest.importorskip("h5py")
+    folder, deck = tmp_path / "out", tmp_path / "deck.inp"
+    flags = ["--tile", "448", "--keep-whole", "100", "--size", "6", "--tile", "700", "--format", "vtkhdf"]
+    assert main(["tiles", str(picture), str(folder), *flags, "--deck", str(deck), "--pixel-size", "0.5"]) == 0
+    assert "1 x 2 tiles of 700 px" in capsys.readouterr().out
+    whole = pv.read(folder / "mesh.vtkhdf")
+    assert isinstance(whole, pv.PartitionedDataSet)
+    assert whole.n_partitions == 2
+    report = json.loads((folder / "report.json").read_text())
+    assert sum(part.n_cells for part in whole) == report["quality"]["n_quads"]
+    assert sum(part.area for part in whole) == pytest.approx(SHAPE[0] * SHAPE[1] / 4)
+    read = meshio.read(deck)
+    assert len(read.cells_dict["quad"]) == report["quality"]["n_quads"]
+    assert {"left", "right", "top", "bottom"} <= {name.lower() for name in read.point_sets}
+
+
+def test_memory_that_does_not_do_is_told_with_the_tile_and_what_fits(
+    picture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hungry(job: Any, t: int, *_: Any) -> None:
+        if t == 1:
+            raise MemoryError
+
+    monkeypatch.setattr(tasks, "outlines", hungry)
+    with pytest.raises(InputError, match=r"tile 0, 1 of 600 px: give --tile 441 \(about 54% of it\), or fewer workers"):
+        mesh_tiles(picture, tmp_path / "out", OPTIONS, tile=600, keep_whole=KEEP)
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        ({"crop": (0, 0, 500, 500)}, "crop is"),
+        ({"tolerance": 2.0}, "tolerance is 2.0"),
+        ({"periodic": "x"}, "periodic is x"),
+        ({"pixel_size": (1.0, 2.0)}, "need square pixels"),
+        ({"colors": "regions"}, "colors = regions is for one picture"),
+    ],
+)
+def test_what_tiles_do_not_have_is_refused(how: dict[str, Any], message: str, picture: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        meshed(picture, tmp_path / "out", how=MeshOptions(**how))
