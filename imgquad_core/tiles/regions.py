@@ -25,6 +25,9 @@ from imgquad_core.model import VOID
 
 from .grid import Box, Grid
 
+STRIP = 256  #: rows that are looked at together
+_FAR = np.iinfo(np.int64).max
+
 
 class TileRegions(NamedTuple):
     """Regions as one tile sees them, numbered by itself."""
@@ -75,19 +78,29 @@ def tile_regions(
     n = int(ids.max(initial=-1)) + 1
     label = np.full(n, VOID, np.int32)
     label[ids[ids >= 0]] = seen[ids >= 0]
-    solid = np.flatnonzero(own.ravel() >= 0)
-    which = own.ravel()[solid]
-    row, column = solid // width + tile[1], solid % width + tile[0]
-    box = np.empty((n, 4), np.int64)
-    box[:, :2], box[:, 2:] = np.iinfo(np.int64).max, -1
-    for k, values in enumerate((column, row)):
-        np.minimum.at(box[:, k], which, values)
-        np.maximum.at(box[:, k + 2], which, values + 1)
-    first = np.full(n, np.iinfo(np.int64).max)
-    np.minimum.at(first, which, row * n_cols + column)
+    found = _Measured(np.zeros(n, np.int64), np.full(n, _FAR), np.tile([_FAR, _FAR, -1, -1], (n, 1)))
+    for start in range(0, height, STRIP):
+        _measure(own[start : start + STRIP], tile[0], tile[1] + start, n_cols, found)
     below = ids[height] if ids.shape[0] > height else np.empty(0, np.int32)
     right = ids[:height, width] if ids.shape[1] > width else np.empty(0, np.int32)
-    return TileRegions(own, label, np.bincount(which, minlength=n).astype(np.int64), first, box, below, right)
+    return TileRegions(own, label, found.pixels, found.first, found.box, below, right)
+
+
+class _Measured(NamedTuple):
+    pixels: Ints
+    first: Ints
+    box: Ints
+
+
+def _measure(ids: Labels, left: int, upper: int, n_cols: int, found: _Measured) -> None:
+    """Add what some rows have of each region, in place."""
+    solid = np.flatnonzero(ids.ravel() >= 0)
+    which, row, column = ids.ravel()[solid], solid // ids.shape[1] + upper, solid % ids.shape[1] + left
+    found.pixels[:] += np.bincount(which, minlength=len(found.pixels))
+    np.minimum.at(found.first, which, row * n_cols + column)
+    for k, values in enumerate((column, row)):
+        np.minimum.at(found.box[:, k], which, values)
+        np.maximum.at(found.box[:, k + 2], which, values + 1)
 
 
 def joined_regions(grid: Grid, tiles: list[TileRegions]) -> Regions:
@@ -112,8 +125,8 @@ def joined_regions(grid: Grid, tiles: list[TileRegions]) -> Regions:
         how.at(found, of, values)
         return found
 
-    first, pixels = total(np.minimum, "first", np.iinfo(np.int64).max), total(np.add, "pixels", 0)
-    low, high = total(np.minimum, "box", np.iinfo(np.int64).max)[:, :2], total(np.maximum, "box", -1)[:, 2:]
+    first, pixels = total(np.minimum, "first", _FAR), total(np.add, "pixels", 0)
+    low, high = total(np.minimum, "box", _FAR)[:, :2], total(np.maximum, "box", -1)[:, 2:]
     label = np.full(n_sets, VOID, np.int32)
     label[of] = np.concatenate([tile.label for tile in tiles])
     order = np.argsort(first, kind="stable")[: np.count_nonzero(pixels)]  # those without pixels come last
@@ -162,15 +175,23 @@ class Keys(NamedTuple):
     tile: Ints  #: (n_keys,) whose it is
 
 
-def keys_of(ids: NDArray[np.int64], tile: NDArray[np.int64], grid: Grid, regions: Regions) -> Keys:
+class Part(NamedTuple):
+    """What a window has of one tile."""
+
+    tile: int
+    place: tuple[slice, slice]  #: in the window
+    ids: Labels  #: as the tile numbers its regions, -1 void
+
+
+def keys_of(shape: tuple[int, int], parts: list[Part], grid: Grid, regions: Regions) -> Keys:
     """Return the keys of a window.
 
     Parameters
     ----------
-    ids : int64, shape (n_rows, n_cols)
-        Number of each pixel's region in `regions`, -1 void.
-    tile : int64, shape (n_rows, n_cols)
-        The tile that it lies in.
+    shape : tuple of int
+        (n_rows, n_cols) of the window.
+    parts : list of Part
+        What it is made of.
     grid, regions
         Of the picture.
 
@@ -178,14 +199,23 @@ def keys_of(ids: NDArray[np.int64], tile: NDArray[np.int64], grid: Grid, regions
     -----
     Keys rise with the material, then with region and tile, in every window: so ambiguous corners are decided alike.
     """
-    solid = ids >= 0
-    region = ids[solid]
-    owner = np.where(regions.is_cut[region], tile[solid], regions.owner[region])
-    faces, at = np.unique(region * grid.n_tiles + owner, return_inverse=True)
-    region, owner = faces // grid.n_tiles, faces % grid.n_tiles
-    order = np.lexsort((owner, region, regions.label[region]))
-    place = np.empty(len(order), np.int32)
-    place[order] = np.arange(len(order))
-    pixels = np.full(ids.shape, VOID, np.int32)
-    pixels[solid] = place[at.ravel()]
-    return Keys(pixels, region[order], owner[order])
+    codes = [_codes(part, grid, regions) for part in parts]
+    faces = np.unique(np.concatenate([np.empty(0, np.int64), *codes]))
+    faces = faces[faces >= 0]
+    region, tile = faces // grid.n_tiles, faces % grid.n_tiles
+    order = np.lexsort((tile, region, regions.label[region]))
+    key = np.empty(len(order) + 1, np.int32)
+    key[order], key[-1] = np.arange(len(order)), VOID
+    pixels = np.empty(shape, np.int32)
+    for part, code in zip(parts, codes, strict=True):
+        at = np.where(code >= 0, np.searchsorted(faces, code), len(faces))
+        pixels[part.place] = key[at][part.ids]
+    return Keys(pixels, region[order], tile[order])
+
+
+def _codes(part: Part, grid: Grid, regions: Regions) -> Ints:
+    """Return for each number of a tile's regions, and at last for void, region and owner in one; -1 if not there."""
+    number = regions.number[regions.offsets[part.tile] : regions.offsets[part.tile + 1]]
+    there = np.bincount(part.ids.ravel() + 1, minlength=len(number) + 1)[1:] > 0
+    owner = np.where(regions.is_cut[number], part.tile, regions.owner[number])
+    return np.append(np.where(there, number * grid.n_tiles + owner, -1), -1)

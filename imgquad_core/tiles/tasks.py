@@ -46,7 +46,7 @@ from .grid import Box, Grid
 from .meshes import Patch, TileMesh, mesh_outlines, open_nodes, patched
 from .numbering import Own, Rim, numbers_of, owned
 from .outlines import Outlines, outlines_of, settled
-from .regions import Regions, TileRegions, joined_regions, keys_of, tile_regions
+from .regions import Part, Regions, TileRegions, joined_regions, keys_of, tile_regions
 from .rules import Rules, load_rules, rules_of, save_rules
 from .sources import Source, sample_boxes
 
@@ -148,16 +148,24 @@ def _counts(values: Labels, numbers: Labels) -> Ints:
     return total
 
 
-def _window_of(job: Job, kind: str, box: Box, dtype: Any) -> Any:
-    """Put a window together from what its tiles have left."""
-    whole = np.empty((box[3] - box[1], box[2] - box[0]), dtype)
+def _parts_of(job: Job, kind: str, box: Box) -> list[Part]:
+    """Return what tiles have left of a window."""
+    found = []
     for t in job.grid.tiles_in(box):
         left, upper, right, lower = job.grid.box(t)
         first, top = max(left, box[0]), max(upper, box[1])
         last, end = min(right, box[2]), min(lower, box[3])
         plane = np.load(job.path(kind, t).with_suffix(".npy"), mmap_mode="r")
-        part = plane[top - upper : end - upper, first - left : last - left]
-        whole[top - box[1] : end - box[1], first - box[0] : last - box[0]] = part
+        place = slice(top - box[1], end - box[1]), slice(first - box[0], last - box[0])
+        found.append(Part(t, place, plane[top - upper : end - upper, first - left : last - left]))
+    return found
+
+
+def _labels_of(job: Job, box: Box) -> Labels:
+    """Put the labels of a window together."""
+    whole = np.empty((box[3] - box[1], box[2] - box[0]), np.int32)
+    for part in _parts_of(job, "labels", box):
+        whole[part.place] = part.ids
     return whole
 
 
@@ -173,9 +181,7 @@ def regions(job: Job, t: int, *_: Any) -> None:
     extended = job.grid.clipped((box[0], box[1], box[2] + 1, box[3] + 1))
     reach = int(CORNER_REACH * max(rules.step)) + 1
     window = job.grid.clipped((extended[0] - reach, extended[1] - reach, extended[2] + reach, extended[3] + reach))
-    found = tile_regions(
-        _window_of(job, "labels", window, np.int32), window, box, extended, job.grid.shape[1], rules.extraction
-    )
+    found = tile_regions(_labels_of(job, window), window, box, extended, job.grid.shape[1], rules.extraction)
     save_plane(path, found.ids)
     edges = {"above": found.ids[0], "beside": found.ids[:, 0]}
     save_arrays(job.path("regions", t), **{k: v for k, v in found._asdict().items() if k != "ids"}, **edges)
@@ -213,14 +219,7 @@ def outlines(job: Job, t: int, *_: Any) -> None:
         return
     rules, grid, every = job.rules(), job.grid, _regions_of(job)
     window = grid.window(t)
-    ids, tile = _window_of(job, "ids", window, np.int64), np.empty((window[3] - window[1], window[2] - window[0]), int)
-    for other in grid.tiles_in(window):
-        box = grid.box(other)
-        at = np.s_[max(box[1] - window[1], 0) : box[3] - window[1], max(box[0] - window[0], 0) : box[2] - window[0]]
-        local = ids[at]
-        ids[at] = np.where(local >= 0, every.number[every.offsets[other] + local], -1)
-        tile[at] = other
-    keys = keys_of(ids, tile, grid, every)
+    keys = keys_of((window[3] - window[1], window[2] - window[0]), _parts_of(job, "ids", window), grid, every)
     if not (keys.tile == t).any():
         save_arrays(path, **_no_outlines()._asdict())
         return

@@ -10,7 +10,7 @@ from imgquad_core.boundary import ExtractionOptions, extract_boundaries
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID
 from imgquad_core.tiles import Grid, grid_of
-from imgquad_core.tiles.regions import Regions, TileRegions, joined_regions, keys_of, tile_regions
+from imgquad_core.tiles.regions import Keys, Part, Regions, TileRegions, joined_regions, keys_of, tile_regions
 from support.labels import label_image
 
 OPTIONS = ExtractionOptions()
@@ -25,6 +25,16 @@ def regions_by_tiles(labels: Labels, grid: Grid) -> tuple[Regions, list[TileRegi
         part = labels[window[1] : window[3], window[0] : window[2]]
         tiles.append(tile_regions(part, window, box, extended, labels.shape[1], OPTIONS))
     return joined_regions(grid, tiles), tiles
+
+
+def keys_in(box: tuple[int, int, int, int], grid: Grid, found: Regions, tiles: list[TileRegions]) -> Keys:
+    parts = []
+    for t in grid.tiles_in(box):
+        left, upper, right, lower = grid.box(t)
+        first, top, last, end = max(left, box[0]), max(upper, box[1]), min(right, box[2]), min(lower, box[3])
+        place = np.s_[top - box[1] : end - box[1], first - box[0] : last - box[0]]
+        parts.append(Part(t, place, tiles[t].ids[top - upper : end - upper, first - left : last - left]))
+    return keys_of((box[3] - box[1], box[2] - box[0]), parts, grid, found)
 
 
 def whole_ids(grid: Grid, found: Regions, tiles: list[TileRegions]) -> np.ndarray:
@@ -63,14 +73,15 @@ def test_keys_are_alike_in_all_windows() -> None:
     labels = np.kron(rng.integers(0, 3, (10, 12)), np.ones((5, 5))).astype(np.int32)
     grid = Grid(labels.shape, 16, 6)
     found, tiles = regions_by_tiles(labels, grid)
-    ids = whole_ids(grid, found, tiles)
-    row, column = np.indices(labels.shape) // 16
-    tile = row * grid.across + column
-    whole = keys_of(ids, tile, grid, found)
+    whole = keys_in((0, 0, 60, 50), grid, found, tiles)
     faces = list(zip(found.label[whole.region], whole.region, whole.tile, strict=True))
     assert faces == sorted(faces)  # they rise with the material
+    assert np.array_equal(whole.region[whole.pixels], whole_ids(grid, found, tiles))
+    row, column = np.indices(labels.shape) // 16
+    cut = found.is_cut[whole.region[whole.pixels]]
+    assert np.array_equal(whole.tile[whole.pixels][cut], (row * grid.across + column)[cut])
     part = np.s_[3:40, 9:50]
-    window = keys_of(ids[part], tile[part], grid, found)
+    window = keys_in((9, 3, 50, 40), grid, found, tiles)
     assert np.array_equal(window.region[window.pixels], whole.region[whole.pixels[part]])
     assert np.array_equal(window.tile[window.pixels], whole.tile[whole.pixels[part]])
     order = (np.argsort(keys.ravel(), kind="stable") for keys in (window.pixels, whole.pixels[part]))
