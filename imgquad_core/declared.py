@@ -187,4 +187,6 @@ POLICY = Declaration(
     topic="boundaries",
 )
 EFFORT = Declaration("normal", "how far the mesh is optimised", str, choices=("fast", "normal", "best"))
-THREADS = Declaration(1, "number of threads; the mesh does not depend on it", int, least=1)
+THREADS = Declaration(
+    0, "number of threads, 0: one for each core that may be used; the mesh does not depend on it", int, least=0
+)

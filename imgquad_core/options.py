@@ -108,7 +108,7 @@ class MeshOptions:
     effort : "fast", "normal" or "best"
         How far the mesh is optimised.
     threads : int
-        Number of threads of the meshing stage; the mesh does not depend on it.
+        Number of threads, 0: one for each core that may be used; the mesh does not depend on it.
     triangulator : "auto", "triangle" or "cdt"
         Who makes the Delaunay triangles that quads come from; `auto` is Triangle where it is installed, else CDT.
     """

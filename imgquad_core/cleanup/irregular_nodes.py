@@ -10,6 +10,8 @@ Rim nodes (on constraints) never move and never vanish; `wanted` tells how many 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
@@ -21,6 +23,7 @@ from .cavity import (
     COST,
     MEMBERS,
     OUTLINE,
+    STAMP,
     Cavity,
     Net,
     add_ring,
@@ -44,7 +47,21 @@ TRIAL_SWEEPS = 5  # of smoothing a new pattern before it is judged; the whole me
 SMALLEST_SHARE, LARGEST_SHARE = 0.15, 4.0  # of a new quad's area in the mean of the cavity
 FEWEST, MOST = 0.7, 1.4  # new quads per old quad
 FLAT = 2  # quads beside a side of a pattern
+VAIN, FOUND, CHANGED = range(3)  # what comes of a search
+BY_ITSELF = 1 << 40  # quads, more than any cavity: the search ended before it met its limit
 RETRY = 1.3  # a cavity this much larger than the last failed one is tried again at the same gain
+
+
+class Memory(NamedTuple):
+    """What vain searches have found out: none is repeated where nothing has changed. Time counts successes."""
+
+    changed: Ints  # when each node was last changed
+    face_changed: Ints  # ... or any node of a face
+    tried: Ints  # when there was a vain search around each node
+    reach: Ints  # up to which number of quads, or `BY_ITSELF`
+    gain: Ints  # of the last pattern that was tried then
+    size: Ints  # quads of its cavity
+    now: Ints  # (1,)
 
 
 def clean_up(mesh: FaceQuads, how: CleanUp, seeds: Flags | None = None) -> FaceQuads:
@@ -69,10 +86,42 @@ def clean_up(mesh: FaceQuads, how: CleanUp, seeds: Flags | None = None) -> FaceQ
     largest = max(how.sizes)
     net = net_of(mesh, largest)
     cavity, canvas = scratch(net, largest)
+    memory = _empty_memory(len(net.valence), int(mesh.face.max()) + 1)
     begins = padded(np.ones(len(mesh.points), bool) if seeds is None else seeds, len(net.valence), True)
     for size in how.sizes:
-        _clean_pass(net, cavity, canvas, begins, size, how.tolerance, how.worst, size > how.thorough)
+        _clean_pass(net, cavity, canvas, begins, memory, size, how.tolerance, how.worst, size > how.thorough)
     return compact(net, mesh)
+
+
+def _empty_memory(n_nodes: int, n_faces: int) -> Memory:
+    a_node = (np.zeros(n_nodes, np.int64) for _ in range(5))
+    changed, tried, reach, gain, size = a_node
+    return Memory(changed, np.zeros(n_faces, np.int64), tried, reach, gain, size, np.zeros(1, np.int64))
+
+
+@verb
+def _is_unchanged(net: Net, cavity: Cavity, changed: Ints, since: int) -> bool:
+    """Whether nothing that growing the cavity has looked at was changed: its quads and those beside them."""
+    for i in range(cavity.tally[MEMBERS]):
+        for h in range(4 * cavity.members[i], 4 * cavity.members[i] + 4):
+            if changed[net.quads[h >> 2, h & 3]] > since:
+                return False
+            t = net.twins[h] >> 2
+            if t >= 0 and cavity.in_cavity[t] != cavity.tally[STAMP]:
+                for k in range(4):
+                    if changed[net.quads[t, k]] > since:
+                        return False
+    return True
+
+
+@verb
+def _remember_change(cavity: Cavity, memory: Memory, face: int, new_id: Ints, n_new: int) -> None:
+    memory.now[0] += 1
+    memory.face_changed[face] = memory.now[0]
+    for i in range(cavity.tally[OUTLINE]):
+        memory.changed[cavity.loop[i]] = memory.now[0]
+    for i in range(n_new):
+        memory.changed[new_id[i]] = memory.now[0]
 
 
 @verb
@@ -154,12 +203,74 @@ def _choose(net: Net, cavity: Cavity, cut: Ints, last_gain: int, last_size: int)
     return 0
 
 
+@inlined
+def _draw_better(
+    net: Net, cavity: Cavity, canvas: Canvas, cut: Ints, gain: int, tolerance: float, worst: float
+) -> bool:
+    """Draw a pattern and smooth it; return whether it may replace the cavity."""
+    canvas.tally[POINTS], canvas.tally[QUADS] = 0, 0
+    draw_cut(canvas, cavity.loop, cavity.corner, cavity.length, cavity.tally[CORNERS], cut)
+    smooth_drawn(canvas, TRIAL_SWEEPS)
+    return _is_better(net, cavity, canvas, gain, tolerance, worst)
+
+
+@inlined
+def _search(
+    net: Net,
+    cavity: Cavity,
+    canvas: Canvas,
+    cut: Ints,
+    memory: Memory,
+    v: int,
+    known: int,
+    largest: int,
+    tolerance: float,
+    worst: float,
+) -> int:
+    """Grow a cavity around node v until a better pattern fits, which is drawn then.
+
+    Cavities of up to `known` quads were tried in vain before: they are grown only. If anything has changed since then
+    this is `CHANGED`, without a result.
+    """
+    begin(cavity)
+    add_ring(net, cavity, v)
+    last_gain, last_size, outcome = 0, 0, VAIN
+    while settle(net, cavity, largest, FLAT):
+        size = cavity.tally[MEMBERS]
+        if 0 < known < size:
+            if not _is_unchanged(net, cavity, memory.changed, memory.tried[v]):
+                break
+            known, last_gain, last_size = 0, memory.gain[v], memory.size[v]
+        if known == 0:
+            gain = _choose(net, cavity, cut, last_gain, last_size)
+            if gain > 0:
+                if _has_room(net, cavity, cut) and _draw_better(net, cavity, canvas, cut, gain, tolerance, worst):
+                    outcome = FOUND
+                    break
+                last_gain, last_size = gain, size
+        grown = push_all(net, cavity) if cavity.tally[CORNERS] < 2 else push_side(net, cavity)
+        if not grown:
+            break
+    if known > 0 and not _is_unchanged(net, cavity, memory.changed, memory.tried[v]):
+        outcome = CHANGED
+    if outcome == VAIN:
+        if known == 0:
+            memory.gain[v], memory.size[v] = last_gain, last_size
+        memory.tried[v] = memory.now[0]
+        least = memory.reach[v] if known > 0 else 0
+        memory.reach[v] = BY_ITSELF if cavity.tally[MEMBERS] <= largest else max(largest, least)
+        if min(net.tops[QUADS], net.tops[POINTS]) < 2 * largest:
+            memory.reach[v] = 0  # it may have failed for want of room
+    return outcome
+
+
 @kernel
 def _clean_pass(
     net: Net,
     cavity: Cavity,
     canvas: Canvas,
     begins: Flags,
+    memory: Memory,
     largest: int,
     tolerance: float,
     worst: float,
@@ -174,24 +285,16 @@ def _clean_pass(
             continue
         if crowded_only and net.valence[v] < net.wanted[v]:
             continue
-        begin(cavity)
-        add_ring(net, cavity, v)
-        last_gain, last_size = 0, 0
-        while settle(net, cavity, largest, FLAT):
-            gain = _choose(net, cavity, cut, last_gain, last_size)
-            if gain > 0:
-                if _has_room(net, cavity, cut):
-                    canvas.tally[POINTS], canvas.tally[QUADS] = 0, 0
-                    draw_cut(canvas, cavity.loop, cavity.corner, cavity.length, cavity.tally[CORNERS], cut)
-                    smooth_drawn(canvas, TRIAL_SWEEPS)
-                    if _is_better(net, cavity, canvas, gain, tolerance, worst):
-                        face = net.face[cavity.members[0]]
-                        remove(net, cavity)
-                        insert(net, canvas, new_id, face)
-                        done += 1
-                        break
-                last_gain, last_size = gain, cavity.tally[MEMBERS]
-            grown = push_all(net, cavity) if cavity.tally[CORNERS] < 2 else push_side(net, cavity)
-            if not grown:
-                break
+        known, outcome = memory.reach[v], CHANGED
+        if known == BY_ITSELF and memory.face_changed[net.face[net.ring[v, 0]]] <= memory.tried[v]:
+            continue
+        while outcome == CHANGED:
+            outcome = _search(net, cavity, canvas, cut, memory, v, known, largest, tolerance, worst)
+            known = 0
+        if outcome == FOUND:
+            face = net.face[cavity.members[0]]
+            remove(net, cavity)
+            insert(net, canvas, new_id, face)
+            _remember_change(cavity, memory, face, new_id, canvas.tally[POINTS])
+            done += 1
     return done

@@ -17,7 +17,7 @@ from imgquad_core.model import QuadMesh
 from .batches import in_batches
 from .faces import INNER_VALENCE, FaceQuads, faces_only, joined, stitched, wanted_quads
 from .irregular_nodes import clean_up
-from .options import CleanUp, OptimizationOptions
+from .options import CleanUp, OptimizationOptions, threads_of
 from .relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
 from .strips import nodes_around
 
@@ -51,7 +51,7 @@ def optimize(mesh: QuadMesh, options: OptimizationOptions | None = None) -> Quad
     options = options or OptimizationOptions()
     old = cut_at_chains(mesh)
     how = EFFORTS[options.effort]
-    new = joined(in_batches(old, lambda part: _relaxed(clean_up(_relaxed(part), how)), options.threads))
+    new = joined(in_batches(old, lambda part: _relaxed(clean_up(_relaxed(part), how)), threads_of(options.threads)))
     better = _is_better(old, new, len(mesh.region_label))
     return stitched_onto(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -28,6 +29,15 @@ class Portions(NamedTuple):
 PORTIONS = Portions()
 
 
+def threads_of(asked: int) -> int:
+    """Return the number of threads that was asked for; 0 asks for all cores that the process may use."""
+    if asked:
+        return asked
+    if hasattr(os, "process_cpu_count"):  # Python 3.13
+        return os.process_cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @dataclass(frozen=True)
 class OptimizationOptions:
     """How far a mesh is optimised.
@@ -37,7 +47,7 @@ class OptimizationOptions:
     effort : {"fast", "normal", "best"}
         How far irregular nodes are hunted.
     threads : int
-        Number of threads; the mesh does not depend on it.
+        Number of threads, 0: one for each core that may be used; the mesh does not depend on it.
     """
 
     effort: str = EFFORT.field()

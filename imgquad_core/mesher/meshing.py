@@ -65,7 +65,7 @@ def mesh_boundaries(
     state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options))
     state = with_musts(with_wishes(state, options), options)
     mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
-    return _slid(mesh, EFFORTS[options.effort].slides, options.threads, options.tuning.portions)
+    return _slid(mesh, EFFORTS[options.effort].slides, options.n_threads, options.tuning.portions)
 
 
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:

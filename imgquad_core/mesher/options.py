@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from imgquad_core.cleanup.options import threads_of
 from imgquad_core.declared import EFFORT, GROWTH, MATERIAL_SIZES, SIZE, THREADS, check, option
 
 from .efforts import TUNING, Tuning
@@ -33,7 +34,7 @@ class MeshingOptions:
     effort : {"fast", "normal", "best"}
         How far irregular nodes are hunted.
     threads : int
-        Number of threads; the mesh does not depend on it.
+        Number of threads, 0: one for each core that may be used; the mesh does not depend on it.
     triangulator : {"auto", "triangle", "cdt"}
         Who makes the Delaunay triangles that quads come from; see `triangulator_used`.
     tuning : Tuning
@@ -56,6 +57,11 @@ class MeshingOptions:
     def __post_init__(self) -> None:
         check(self)
         triangulator_used(self.triangulator)
+
+    @property
+    def n_threads(self) -> int:
+        """Number of threads to use."""
+        return threads_of(self.threads)
 
     def slope(self, stride: int) -> float:
         """Growth of the length of segments of `stride` final edges per unit of length inside faces."""

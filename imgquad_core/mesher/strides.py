@@ -29,6 +29,7 @@ from .options import MeshingOptions
 from .outline import Outline, chains_in_conflict, chains_of, coarse_segments, mean_edges, outline, wide_faces
 from .splitting import split_composed
 from .triangulation import Triangles, constraint_table, triangulate
+from .warm_up import compile_last_stages
 
 LEAST_WIDTH = 3.0  # of a face that is meshed on stride 4, in its coarse segments
 EVEN = {4: 0.7, 6: 0.8}  # of the size inside, mean edge around a face at a stride: within it the size hardly grows
@@ -122,15 +123,17 @@ def _mesh_at_stride(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanU
     portions = options.tuning.portions
     groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
     composed = in_threads(
-        groups, lambda group: batches_of(_compose(graph, group, stride, options), portions), options.threads
+        groups, lambda group: batches_of(_compose(graph, group, stride, options), portions), options.n_threads
     )
     ahead.wait()
+    if options.n_threads > 1:
+        compile_last_stages()  # loaded by threads, in turn and one in the other's way, machine code takes twice as long
     rim = coarse_segments(graph, chains_of(graph, faces), stride // 2)  # the Catmull-Clark split has halved edges
     nothing = np.zeros(len(rim.tail), np.int64)
     table = constraint_table(len(graph.points), rim.tail, rim.head, nothing, nothing, rim.middle)
     batches = [batch for group in composed for batch in group]
-    parts = finished(batches, Task(graph.points, stride // 2, table, how, options.threads, portions))
-    in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.threads)
+    parts = finished(batches, Task(graph.points, stride // 2, table, how, options.n_threads, portions))
+    in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.n_threads)
     return Meshed(parts, faces, worst)
 
 

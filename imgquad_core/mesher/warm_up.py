@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 
+@cache
 def compile_last_stages() -> None:
-    """Compile the optimisation of quads, by using it on one."""
+    """Compile the optimisation of quads, or load it, by using it on one."""
     from imgquad_core.cleanup.faces import FaceQuads
     from imgquad_core.cleanup.irregular_nodes import clean_up
     from imgquad_core.cleanup.options import CleanUp

@@ -21,7 +21,7 @@ REALS = ("size", "boundary_size", "growth", "edge_ratio", "max_shift", "pixel_si
 WRONG: list[tuple[str, Any]] = [
     *((name, value) for name in REALS for value in ("4", math.nan, math.inf, -1.0, 1e308, [1], True, 1j)),
     *((name, None) for name in ("size", "growth", "edge_ratio", "max_shift", "pixel_size", "threads", "max_pixels")),
-    *((name, 0) for name in ("size", "boundary_size", "pixel_size", "threads", "max_pixels")),
+    *((name, 0) for name in ("size", "boundary_size", "pixel_size", "max_pixels")),
     *((name, v) for name in ("threads", "max_pixels", "frame") for v in (2.5, "2", -1, True, math.nan)),
     *(("crop", value) for value in ((0, 0, 10.5, 10), (1, 2, 3), "abcd", 5, (0, 0, 0, 0), (0, 0, 99, 9), (5, 5, 2, 9))),
     *(("drop", value) for value in (1.5, [None], [1.5], object())),

@@ -204,7 +204,7 @@ def test_nohup_is_respected() -> None:
         "--layers 3",
         "--nodes 9",
         "--frame 3",
-        "--threads 0",
+        "--threads -1",
         "--size-of 0=nan",
     ],
 )

@@ -20,7 +20,7 @@ Grid: TypeAlias = "pv.UnstructuredGrid | pv.PolyData"
 
 
 def optimize(
-    grid: Grid, *, effort: Effort = "normal", threads: int = 1, progress_bar: bool = False
+    grid: Grid, *, effort: Effort = "normal", threads: int = 0, progress_bar: bool = False
 ) -> pv.UnstructuredGrid:
     """Lower the number of irregular nodes of a mesh of quads and raise its worst scaled Jacobian.
 
@@ -32,8 +32,8 @@ def optimize(
         Quads in any plane, with the cell array ``material`` (one material without it).
     effort : "fast" | "normal" | "best", default: "normal"
         How far irregular nodes are hunted.
-    threads : int, default: 1
-        Number of threads; the mesh does not depend on it.
+    threads : int, default: 0
+        Number of threads, 0: one for each core that may be used; the mesh does not depend on it.
     progress_bar : bool, default: False
         Display a progress bar.
 

@@ -318,7 +318,7 @@ def mesh(
     drop_transparent: bool = False,
     periodic: Periodic = "none",
     effort: Effort = "normal",
-    threads: int = 1,
+    threads: int = 0,
     triangulator: Triangulator = "auto",
     unit: Unit = "pixels",
     sample: str | Sequence[str] = (),
@@ -388,8 +388,8 @@ def mesh(
         Opposite sides get nodes at the same places, for a periodic cell.
     effort : "fast" | "normal" | "best", default: "normal"
         How far the mesh is optimised.
-    threads : int, default: 1
-        Number of threads of the meshing stage; the mesh does not depend on it.
+    threads : int, default: 0
+        Number of threads, 0: one for each core that may be used; the mesh does not depend on it.
     triangulator : "auto" | "triangle" | "cdt", default: "auto"
         Who makes the Delaunay triangles that quads come from: Triangle (not for commercial use), CDT, or ``auto``:
         Triangle where it is installed, else CDT.

@@ -116,7 +116,7 @@ def quads(
     material_sizes: MaterialSizes = None,
     growth: float | None = None,
     effort: Effort = "normal",
-    threads: int = 1,
+    threads: int = 0,
     triangulator: Triangulator = "auto",
     unit: Unit = "pixels",
     progress_bar: bool = False,
@@ -135,8 +135,8 @@ def quads(
         Largest ratio of the sizes of neighbouring elements.
     effort : "fast" | "normal" | "best", default: "normal"
         How far the mesh is optimised.
-    threads : int, default: 1
-        Number of threads; the mesh does not depend on it.
+    threads : int, default: 0
+        Number of threads, 0: one for each core that may be used; the mesh does not depend on it.
     triangulator : "auto" | "triangle" | "cdt", default: "auto"
         Who makes the Delaunay triangles that quads come from, see `mesh`.
     unit : "pixels" | "world", default: "pixels"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,49 +126,92 @@ def _of_faces(layer: Layer) -> dict[str, NDArray[Any]]:
     return columns
 
 
-def layer_of(mesh: Any) -> Layer:
+class Faces(NamedTuple):
+    """The faces of a ``pymeshlab.Mesh``, and where they lie among its triangles.
+
+    Parameters
+    ----------
+    offsets, corners : int64
+        Face f has the corners ``corners[offsets[f]:offsets[f + 1]]``.
+    triangles : int32, shape (n_triangles, 3)
+        As MeshLab has them.
+    first : int64, shape (n_faces,)
+        One triangle of each face.
+    """
+
+    offsets: Ints
+    corners: Ints
+    triangles: Labels
+    first: Ints
+
+
+def layer_of(mesh: Any, faces: Faces | None = None) -> Layer:
     """Take the arrays out of a ``pymeshlab.Mesh``.
 
     Parameters
     ----------
     mesh : pymeshlab.Mesh
         Made compact if it is not.
+    faces : Faces, optional
+        Its faces where they are known, from `faces_of`.
 
     Returns
     -------
     Layer
         Coordinates with the layer's transformation applied; quads in order and with their first corner first.
     """
-    if not mesh.is_compact():
-        mesh.compact()
-    faces = _polygons(mesh)
-    offsets = np.concatenate([[0], np.cumsum([len(f) for f in faces])]).astype(np.int64)
-    corners = np.concatenate(faces).astype(np.int64) if faces else np.empty(0, np.int64)
-    first = _triangle_of_face(offsets, corners, np.asarray(mesh.face_matrix(), np.int64))
+    faces = faces_of(mesh) if faces is None else faces
+    some, first = len(faces.first) > 0, faces.first
     return Layer(
         points=np.array(mesh.transformed_vertex_matrix()),
-        face_offsets=offsets,
-        face_points=corners,
+        face_offsets=faces.offsets,
+        face_points=faces.corners,
         edges=np.array(mesh.edge_matrix(), np.int64).reshape(-1, 2),
-        face_color=_bytes(mesh.face_color_matrix())[first] if mesh.has_face_color() and faces else None,
+        face_color=_bytes(mesh.face_color_matrix()[first]) if mesh.has_face_color() and some else None,
         point_color=_bytes(mesh.vertex_color_matrix()) if mesh.has_vertex_color() else None,
-        face_scalar=np.array(mesh.face_scalar_array())[first] if mesh.has_face_scalar() and faces else None,
+        face_scalar=np.array(mesh.face_scalar_array())[first] if mesh.has_face_scalar() and some else None,
         point_scalar=np.array(mesh.vertex_scalar_array()) if mesh.has_vertex_scalar() else None,
         material=_material(mesh, first),
         label=str(mesh.label()),
     )
 
 
-def _polygons(mesh: Any) -> list[NDArray[Any]]:
-    """Return the faces; the triangles themselves where a filter left half a polygon behind."""
-    faces = mesh.polygonal_face_list()
-    if sum(len(f) for f in faces) - 2 * len(faces) != mesh.face_number():
-        return list(mesh.face_matrix())
-    return [np.roll(f, 1) if len(f) == 4 else f for f in faces]
+def faces_of(mesh: Any) -> Faces:
+    """Take the faces out of a ``pymeshlab.Mesh``, which is made compact if it is not."""
+    if not mesh.is_compact():
+        mesh.compact()
+    faces, triangles = mesh.polygonal_face_list(), _triangles(mesh)
+    sizes = np.fromiter(map(len, faces), np.int64, len(faces))
+    if sizes.sum() - 2 * len(faces) != len(triangles):  # a filter has left half a polygon behind
+        sizes, corners = np.full(len(triangles), 3), triangles.astype(np.int64).ravel()
+    else:
+        corners = np.concatenate(faces).astype(np.int64) if faces else np.empty(0, np.int64)
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    last = offsets[1:][sizes == 4] - 1  # pymeshlab begins quads at their second corner
+    corners[last[:, None] - [3, 2, 1, 0]] = corners[last[:, None] - [0, 3, 2, 1]]
+    return Faces(offsets, corners, triangles, _triangle_of_face(offsets, corners, triangles))
 
 
-def _bytes(color: Any) -> Bytes:
-    return np.asarray(np.rint(np.asarray(color) * 255), np.uint8)
+def known_faces(mesh: Any, layer: Layer) -> Faces | None:
+    """Return the faces of a mesh that was made of `layer`; None unless all are quads in order, two triangles each."""
+    triangles = _triangles(mesh)
+    if not _in_pairs(layer.face_offsets, layer.face_points, triangles):
+        return None
+    first = _triangle_of_face(layer.face_offsets, layer.face_points, triangles)
+    return Faces(layer.face_offsets, layer.face_points, triangles, first)
+
+
+def has_triangles(mesh: Any, faces: Faces) -> bool:
+    """Whether the triangles of a mesh are still those of `faces`."""
+    return bool(mesh.is_compact()) and np.array_equal(_triangles(mesh), faces.triangles)
+
+
+def _triangles(mesh: Any) -> Labels:
+    return np.array(mesh.face_matrix(), np.int32).reshape(-1, 3)
+
+
+def _bytes(color: Floats) -> Bytes:
+    return np.asarray(np.rint(color * 255), np.uint8)
 
 
 def _material(mesh: Any, first: Ints) -> Labels | None:
@@ -179,22 +222,22 @@ def _material(mesh: Any, first: Ints) -> Labels | None:
     return np.asarray(np.rint(values[first]), np.int32)
 
 
-def _triangle_of_face(offsets: Ints, corners: Ints, triangles: Ints) -> Ints:
-    """Return for each face one of the triangles that MeshLab made of it: the one with the face's first directed edge.
-
-    A quad's roll by one puts the edge (1, 2) at places (1, 2): not a diagonal of the split, whichever it is.
-    """
+def _triangle_of_face(offsets: Ints, corners: Ints, triangles: NDArray[Any]) -> Ints:
+    """Return for each face the one of MeshLab's triangles that has the face's first directed edge."""
     if len(triangles) == 0:
         return np.empty(0, np.int64)
+    start, end = corners[offsets[:-1]], corners[offsets[:-1] + 1]
+    if _in_pairs(offsets, corners, triangles):
+        return 2 * np.arange(len(start)) + ~_have_edge(triangles[::2], start, end)
     n = int(triangles.max()) + 1
-    keys = (triangles * n + np.roll(triangles, -1, axis=1)).ravel()
+    keys = _edge_keys(triangles, n)
     order = np.argsort(keys, kind="stable")
-    wanted = corners[offsets[:-1]] * n + corners[offsets[:-1] + 1]
+    wanted = start * n + end
     at = np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)
     return np.asarray(order[at] // 3)
 
 
-def face_of_triangle(layer: Layer, triangles: Ints) -> Ints:
+def face_of_triangle(layer: Layer, triangles: NDArray[Any]) -> Ints:
     """Return the face of `layer` that each of MeshLab's triangles belongs to: one of its edges is one of the face's.
 
     ::
@@ -207,13 +250,40 @@ def face_of_triangle(layer: Layer, triangles: Ints) -> Ints:
     """
     if len(triangles) == 0:
         return np.empty(0, np.int64)
+    if _in_pairs(layer.face_offsets, layer.face_points, triangles):
+        return np.arange(len(triangles)) // 2
     n = len(layer.points)
     after = np.arange(1, len(layer.face_points) + 1)
     after[layer.face_offsets[1:] - 1] = layer.face_offsets[:-1]
     keys = layer.face_points * n + layer.face_points[after]
     owner = np.repeat(np.arange(layer.n_faces), layer.face_sizes)
     order = np.argsort(keys, kind="stable")
-    wanted = triangles * n + np.roll(triangles, -1, axis=1)
+    wanted = _edge_keys(triangles, n).reshape(-1, 3)
     at = np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)
     found = keys[order][at] == wanted
     return np.asarray(owner[order[at[np.arange(len(triangles)), np.argmax(found, axis=1)]]])
+
+
+def _edge_keys(triangles: NDArray[Any], n_points: int) -> Ints:
+    """Return a number for each directed edge, three a triangle in order."""
+    wide = triangles.astype(np.int64)
+    return (wide * n_points + np.roll(wide, -1, axis=1)).ravel()
+
+
+def _have_edge(triangles: NDArray[Any], start: Ints, end: Ints) -> NDArray[np.bool_]:
+    """Tell of each triangle whether it has the directed edge from `start` to `end`."""
+    pairs = ((0, 1), (1, 2), (2, 0))
+    return np.logical_or.reduce([(triangles[:, a] == start) & (triangles[:, b] == end) for a, b in pairs])
+
+
+def _in_pairs(offsets: Ints, corners: Ints, triangles: NDArray[Any]) -> bool:
+    """Whether all faces are quads and triangles 2f and 2f + 1 each have two neighbouring edges of quad f."""
+    n = len(offsets) - 1
+    if len(corners) != 4 * n or len(triangles) != 2 * n or (np.diff(offsets) != 4).any():
+        return False
+    q = corners.reshape(-1, 4).T
+    one, two = (
+        [_have_edge(half, q[k], q[(k + 1) % 4]) for k in range(4)] for half in (triangles[::2], triangles[1::2])
+    )
+    ways = [one[k] & one[(k + 1) % 4] & two[(k + 2) % 4] & two[(k + 3) % 4] for k in range(4)]
+    return bool(np.logical_or.reduce(ways).all())

@@ -101,6 +101,7 @@ class MeshLabProcess:
         self._count = 0
         self._started = False
         self._saved: Path | None = None
+        self._files: dict[int, Path] = {}  # of layers, by id, that are still what their file has
 
     def __enter__(self) -> MeshLabProcess:
         return self
@@ -168,13 +169,16 @@ class MeshLabProcess:
         path = self._file("npz")
         save_layer(layer, path)
         self._saved = path
-        return int(self.ask("add", file=str(path)))
+        mesh = int(self.ask("add", file=str(path)))
+        self._files[mesh] = path
+        return mesh
 
     def put(self, layer: Layer) -> int:
         """Put a layer in the place of the current one. Return its id."""
         former = self.layers[1]
         mesh = self.add(layer)
         self.ask("delete", mesh=former)
+        self._forget(former)
         return mesh
 
     def open(self, path: Path) -> int:
@@ -207,6 +211,7 @@ class MeshLabProcess:
     def _applied(
         self, function: str, parameters: Sequence[tuple[str, str, Any]], script: str | None, printed: str
     ) -> dict[str, Any]:
+        self._forget(*self._files)
         answer = self.ask("apply", function=function, parameters=list(parameters), script=script)
         ignored = re.search(r"parameter (\S+) not required", self._messages()[len(printed) :])
         if answer.get("by_script") and ignored:
@@ -222,9 +227,20 @@ class MeshLabProcess:
 
     def layer(self, mesh: int | None = None) -> Layer:
         """Return the current layer, or the one with this id."""
-        path = self._file("npz")
-        self.ask("save", file=str(path), mesh=mesh)
-        return load_layer(path)
+        return load_layer(self._file_of(self.layers[1] if mesh is None else mesh))
+
+    def _file_of(self, mesh: int) -> Path:
+        if mesh not in self._files:
+            path = self._file("npz")
+            self.ask("save", file=str(path), mesh=mesh)
+            self._files[mesh] = path
+        return self._files[mesh]
+
+    def _forget(self, *meshes: int) -> None:
+        """Remove the files of layers that have changed, but for the last good one."""
+        for path in [self._files.pop(mesh) for mesh in meshes if mesh in self._files]:
+            if path != self._saved:
+                path.unlink(missing_ok=True)
 
     @property
     def layers(self) -> tuple[list[int], int | None]:
@@ -246,18 +262,21 @@ class MeshLabProcess:
         path = self._file("npy")
         np.save(path, values)
         self.ask("give", what=do, file=str(path))
+        path.unlink()
+        _, current = self.layers
+        self._forget(*[] if current is None else [current])
 
     def last_good(self) -> Layer | None:
         """Return the current layer as it was before the filter that failed, or None."""
         return load_layer(self._saved) if self._saved else None
 
     def _keep(self) -> None:
-        if self.layers[1] is not None:
-            path = self._file("npz")
-            self.ask("save", file=str(path))
-            if self._saved:
-                self._saved.unlink(missing_ok=True)
-            self._saved = path
+        _, current = self.layers
+        if current is None:
+            return
+        former, self._saved = self._saved, self._file_of(current)
+        if former and former != self._saved and former not in self._files.values():
+            former.unlink(missing_ok=True)
 
     def _file(self, ending: str) -> Path:
         self._count += 1

@@ -6,7 +6,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cache
 
 from imgquad_core.errors import InputError
@@ -17,10 +17,11 @@ from .names import pymeshlab_folder
 _LOADED_WHOLE = "meshing_tri_to_quad_by_smart_triangle_pairing"
 _PACKAGES = "apt-get install -y --no-install-recommends libgl1 libopengl0"
 _ASK = """
-import json, sys
+import json
 import pymeshlab
-print("FILTERS " + json.dumps(pymeshlab.filter_list()), flush=True)
-for name in sys.argv[1:]:
+names = pymeshlab.filter_list()
+print("FILTERS " + json.dumps(names), flush=True)
+for name in names:
     pymeshlab.print_filter_parameter_list(name)
 """
 #: type in a script -> types that pymeshlab prints for such a parameter
@@ -48,16 +49,29 @@ class MissingMeshLab(InputError):
     """pymeshlab is not installed, or a system library that it needs is not."""
 
 
-def _ask(names: Iterable[str]) -> str:
+@cache
+def start_asking() -> subprocess.Popen[str]:
+    """Start the process that is asked, to work on something else meanwhile."""
     if pymeshlab_folder() is None:
         raise MissingMeshLab("pymeshlab is not installed; pip install 'imgquad-mesh[meshlab]'")
-    done = subprocess.run(
-        [sys.executable, "-c", _ASK, *names], capture_output=True, text=True, timeout=120, errors="replace", check=False
-    )
-    if done.returncode:
-        reason = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+    pipe = subprocess.PIPE
+    return subprocess.Popen([sys.executable, "-c", _ASK], stdout=pipe, stderr=pipe, text=True, errors="replace")
+
+
+@cache
+def _answer() -> str:
+    process = start_asking()
+    try:
+        printed, messages = process.communicate(timeout=120)
+    except BaseException:  # an interrupt, too, must not leave it behind
+        process.kill()
+        raise
+    finally:
+        start_asking.cache_clear()
+    if process.returncode:
+        reason = (messages.strip().splitlines() or [f"exit code {process.returncode}"])[-1]
         raise MissingMeshLab(f"pymeshlab cannot be imported ({reason}); {_PACKAGES}")
-    return done.stdout
+    return printed
 
 
 @cache
@@ -69,7 +83,7 @@ def meshlab_filters() -> tuple[str, ...]:
     MissingMeshLab
         When pymeshlab is missing, cannot be imported, or could load only a part of its plugins.
     """
-    found = re.search(r"^FILTERS (.*)$", _ask([]), re.MULTILINE)
+    found = re.search(r"^FILTERS (.*)$", _answer(), re.MULTILINE)
     names: tuple[str, ...] = tuple(json.loads(found[1])) if found else ()
     if _LOADED_WHOLE not in names:
         raise MissingMeshLab(
@@ -83,10 +97,10 @@ def meshlab_parameters(functions: frozenset[str]) -> dict[str, dict[str, str]]:
     """Return the parameters of some filters: for each filter, Python name -> type as pymeshlab prints it."""
     parameters: dict[str, dict[str, str]] = {name: {} for name in functions}
     current: dict[str, str] = {}
-    for line in _ask(sorted(functions)).splitlines():
+    for line in _answer().splitlines():
         header = re.fullmatch(r"(\w+) filter - list of parameter names:", line)
         if header:
-            current = parameters[header[1]]
+            current = parameters.get(header[1], {})
         entry = re.match(r"\t(\w+) : (.+?) = ", line)
         if entry:
             current[entry[1]] = entry[2]

@@ -135,7 +135,7 @@ def run_script(
 
     Notes
     -----
-    MeshLab's filters run in a child process, which starts at the first of them: scripts of our filters alone need no
+    MeshLab's filters run in a child process, which loads while ours work: scripts of our filters alone need no
     pymeshlab.
     """
     script = read_script(path)
@@ -152,6 +152,8 @@ def run_script(
     check_files(read, [target, *written])
     with ExitStack() as stack:
         runner = _Runner(stack, State(LayerList(), image, base), deadline, memory, read)
+        if any(isinstance(step, MeshLabStep) for step in steps):
+            runner.start_meshlab()  # it loads while our filters work
         runner.load(meshset, mesh)
         results = [runner.step(step, script.file, target) for step in _announced(steps, progress)]
         if target is not None:
@@ -170,7 +172,7 @@ def _announced(steps: list[OwnStep | MeshLabStep], progress: Progress | None) ->
 
 
 class _Runner:
-    """Takes the steps one by one; starts MeshLab's process when it is first needed."""
+    """Takes the steps one by one; MeshLab's process gets the layers at the first of its filters."""
 
     def __init__(self, stack: ExitStack, state: State, deadline: float, memory: float, inputs: Iterable[Path]) -> None:
         self._stack = stack
@@ -178,7 +180,8 @@ class _Runner:
         self._deadline = deadline
         self._memory = memory
         self.state = state
-        self.process: MeshLabProcess | None = None
+        self._started: MeshLabProcess | None = None
+        self.process: MeshLabProcess | None = None  # the same, once it has the layers
 
     def load(self, meshset: Any, mesh: str | Path | QuadMesh | None) -> None:
         for each in meshset if meshset is not None else ():
@@ -208,10 +211,15 @@ class _Runner:
             raise ScriptError(f"filter {step.name!r}: {error}{kept}", str(file), step.line) from error
         return StepResult(step.name, step.function, step.line, program, perf_counter() - start, values)
 
+    def start_meshlab(self) -> MeshLabProcess:
+        if self._started is None:
+            folder = self._stack.enter_context(scratch_folder())
+            self._started = self._stack.enter_context(MeshLabProcess(folder, self._deadline, self._memory))
+        return self._started
+
     def _meshlab(self) -> MeshLabProcess:
         if self.process is None:
-            folder = self._stack.enter_context(scratch_folder())
-            self.process = self._stack.enter_context(MeshLabProcess(folder, self._deadline, self._memory))
+            self.process = self.start_meshlab()
             self._move_layers(self.process)
         return self.process
 

@@ -19,11 +19,29 @@ from numpy.typing import NDArray
 
 from imgquad_core.whole_files import scratch_folder
 
-from .layer import Layer, face_of_triangle, layer_of, load_layer, save_layer, write_ply
+from .layer import (
+    Faces,
+    Layer,
+    face_of_triangle,
+    faces_of,
+    has_triangles,
+    known_faces,
+    layer_of,
+    load_layer,
+    save_layer,
+    write_ply,
+)
 
 Array = NDArray[Any]
 
 
+#: filters that never make other polygons of the same triangles; other ``apply_coord_`` ones do (cubic stylization)
+_KEEP_FACES = (
+    *(f"apply_coord_{how}" for how in ("hc", "laplacian", "taubin", "two_step", "unsharp")),
+    *(f"compute_{what}_by" for what in ("color", "coord", "scalar", "selection")),
+    "get_",
+)
+_FACES: dict[int, Faces] = {}  # of layers, by id, as they were last known
 MEMORY = "IMGQUAD_MESHLAB_BYTES"  #: environment variable with the bytes that the process may use
 
 
@@ -101,7 +119,23 @@ def add_layer(meshes: Any, layer: Layer, folder: Path) -> int:
 
 
 def _add(pymeshlab: Any, meshes: Any, file: str) -> int:
-    return add_layer(meshes, load_layer(Path(file)), Path(file).parent)
+    layer = load_layer(Path(file))
+    mesh = add_layer(meshes, layer, Path(file).parent)
+    known = known_faces(meshes.current_mesh(), layer)
+    if known is not None:
+        _FACES[mesh] = known
+    return mesh
+
+
+def _faces(mesh: Any) -> Faces:
+    """Return the faces of a mesh; as they were where no filter since then makes others of the same triangles.
+
+    pymeshlab gives faces one by one, which takes longer than most filters do.
+    """
+    number = int(mesh.id())
+    if number not in _FACES or not has_triangles(mesh, _FACES[number]):
+        _FACES[number] = faces_of(mesh)
+    return _FACES[number]
 
 
 def _open(pymeshlab: Any, meshes: Any, file: str) -> int:
@@ -117,6 +151,8 @@ def _apply(
     pymeshlab clamps a bounded number to the limits that it has on the current mesh, where MeshLab's own scripts take it
     as it is; then `script`, with this filter alone, is run in MeshLab's way.
     """
+    if not function.startswith(_KEEP_FACES):
+        _FACES.clear()
     for name, kind, value in parameters:
         if kind == "RichMesh" and not meshes.mesh_id_exists(value):
             raise ValueError(f"parameter {name}: there is no mesh {value}; the set has {_ids(meshes)}")
@@ -159,7 +195,8 @@ def _current(meshes: Any) -> int | None:
 
 
 def _save(pymeshlab: Any, meshes: Any, file: str, mesh: int | None = None) -> None:
-    save_layer(layer_of(meshes.current_mesh() if mesh is None else meshes.mesh(mesh)), Path(file))
+    saved = meshes.current_mesh() if mesh is None else meshes.mesh(mesh)
+    save_layer(layer_of(saved, _faces(saved)), Path(file))
 
 
 def _export(pymeshlab: Any, meshes: Any, file: str) -> None:

@@ -79,5 +79,5 @@ def test_threads_and_repetition_change_nothing(mesh: QuadMesh) -> None:
 def test_bad_options_are_named() -> None:
     with pytest.raises(InputError, match="effort is 'none'"):
         OptimizationOptions(effort="none")
-    with pytest.raises(InputError, match="threads is 0"):
-        OptimizationOptions(threads=0)
+    with pytest.raises(InputError, match="threads is -1"):
+        OptimizationOptions(threads=-1)

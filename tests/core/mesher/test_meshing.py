@@ -397,7 +397,7 @@ def test_island_on_the_wrong_side_of_a_chord_is_kept_on_its_own() -> None:
         ({"material_sizes": {3: -1.0}}, "size of material 3 is -1.0"),
         ({"growth": 1.0}, "growth is 1.0; give a ratio from 1.01"),
         ({"effort": "most"}, "effort is 'most'; give one of fast, normal, best"),
-        ({"threads": 0}, "threads is 0; give a whole number of at least 1"),
+        ({"threads": -1}, "threads is -1; give a whole number of at least 0"),
     ],
 )
 def test_bad_options_are_named_with_their_value_and_the_remedy(options: dict[str, Any], message: str) -> None:

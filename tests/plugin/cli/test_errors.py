@@ -115,7 +115,7 @@ BAD_OPTIONS = {
     "min pixels": (["--min-pixels", "-4"], "-4"),
     "min length": (["--min-length", "nan"], "min_length is nan"),
     "policy": (["--policy", "luck"], "luck"),
-    "threads": (["--threads", "0"], "threads"),
+    "threads": (["--threads", "-1"], "threads"),
     "effort": (["--effort", "none"], "none"),
     "pixel limit": (["--max-pixels", "100"], "max_pixels"),
 }

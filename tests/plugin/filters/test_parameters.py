@@ -191,7 +191,7 @@ def test_a_drift_is_found() -> None:
         (lambda: IMAGE.imgquad.mesh(progress_bar=1), "progress_bar must be an instance of <class 'bool'>."),
         (lambda: IMAGE.imgquad.mesh(size=0), "size values must all be greater than 0.0."),
         (lambda: IMAGE.imgquad.mesh(size=0.01), "size is 0.01; give a length of at least 0.05 px"),
-        (lambda: IMAGE.imgquad.mesh(threads=0), "threads is 0; give a whole number of at least 1"),
+        (lambda: IMAGE.imgquad.mesh(threads=-1), "threads is -1; give a whole number of at least 0"),
         (lambda: SMOOTH.imgquad.quads().imgquad.optimize(effort="x"), "effort 'x' is not valid."),
         (lambda: SMOOTH.imgquad.quads().imgquad.plot("area"), "scalars 'area' is not valid."),
         (lambda: IMAGE.imgquad.mesh("label", 3), "takes from 1 to 2 positional arguments but 3 were given"),
