@@ -13,7 +13,7 @@ from typing import Any
 
 from PIL.Image import Resampling
 
-from imgquad_mesh.outputs.rock_picture import rock_picture
+from imgquad_mesh.outputs.rock_picture import draw_rock
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -56,7 +56,7 @@ def answer(script: str, *arguments: object, timeout: float = 900.0) -> dict[str,
 @functools.cache
 def compile_kernels() -> None:
     """Have every kernel compiled and on disk before the first measurement."""
-    labels = rock_picture().crop((0, 0, 160, 160))
+    labels = draw_rock().crop((0, 0, 160, 160))
     photo = labels.convert("RGB").resize((320, 320), Resampling.BILINEAR)
     with tempfile.TemporaryDirectory() as folder:
         for picture in (labels, photo):

@@ -80,7 +80,7 @@ class Declaration:
     @property
     def default_text(self) -> str:
         """The default in words; empty where there is none, or it is false."""
-        if self.told or self.default in (None, False, ()) or isinstance(self.default, Mapping):
+        if self.told or self.default is None or self.default is False or isinstance(self.default, Mapping | tuple):
             return self.told
         return f"{self.default:g}" if isinstance(self.default, float) else str(self.default)
 

@@ -29,7 +29,7 @@ def execute(args: argparse.Namespace) -> int:
     except OSError as error:
         raise InputError(f"cannot make the folder {folder}: {error.strerror}; give another one") from error
     picture = folder / "rock.png"
-    outputs.replace_file(picture, outputs.rock_picture().save)
+    outputs.replace_file(picture, outputs.draw_rock().save)
     files = Outputs(folder / "rock.vtu", report=folder / "rock.json", picture=folder / "mesh.png")
     options = core.MeshOptions(size=5.0, min_pixels=12, min_length=6)
     code = mesh_to_files(picture, options, files)

@@ -273,7 +273,8 @@ def _edge_keys(triangles: NDArray[Any], n_points: int) -> Ints:
 def _have_edge(triangles: NDArray[Any], start: Ints, end: Ints) -> NDArray[np.bool_]:
     """Tell of each triangle whether it has the directed edge from `start` to `end`."""
     pairs = ((0, 1), (1, 2), (2, 0))
-    return np.logical_or.reduce([(triangles[:, a] == start) & (triangles[:, b] == end) for a, b in pairs])
+    found = [(triangles[:, a] == start) & (triangles[:, b] == end) for a, b in pairs]
+    return np.asarray(np.logical_or.reduce(found))
 
 
 def _in_pairs(offsets: Ints, corners: Ints, triangles: NDArray[Any]) -> bool:

@@ -178,7 +178,8 @@ class MeshLabProcess:
         former = self.layers[1]
         mesh = self.add(layer)
         self.ask("delete", mesh=former)
-        self._forget(former)
+        if former is not None:
+            self._forget(former)
         return mesh
 
     def open(self, path: Path) -> int:
@@ -227,7 +228,9 @@ class MeshLabProcess:
 
     def layer(self, mesh: int | None = None) -> Layer:
         """Return the current layer, or the one with this id."""
-        return load_layer(self._file_of(self.layers[1] if mesh is None else mesh))
+        found = self.layers[1] if mesh is None else mesh
+        assert found is not None, "no layer is left"
+        return load_layer(self._file_of(found))
 
     def _file_of(self, mesh: int) -> Path:
         if mesh not in self._files:

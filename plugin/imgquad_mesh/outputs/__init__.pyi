@@ -13,7 +13,7 @@ from .files import (
 )
 from .mesh_picture import draw_materials, material_colors
 from .report import build_report, element_notes
-from .rock_picture import rock_picture
+from .rock_picture import draw_rock
 
 __all__ = [
     "GRID_EXTENSIONS",
@@ -21,11 +21,11 @@ __all__ = [
     "check_files",
     "check_target",
     "draw_materials",
+    "draw_rock",
     "element_notes",
     "material_colors",
     "mesh_extensions",
     "replace_file",
-    "rock_picture",
     "write_boundaries",
     "write_json",
     "write_labels",

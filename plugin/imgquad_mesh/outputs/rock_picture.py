@@ -35,7 +35,7 @@ def rock_labels(columns: int = 420, rows: int = 280, grain: int = 52, noise: flo
     return labels
 
 
-def rock_picture() -> Image.Image:
+def draw_rock() -> Image.Image:
     """Return the picture of a rock, with its palette."""
     picture = Image.fromarray(rock_labels())
     picture.putpalette([value for color in PALETTE for value in color])  # the indices are the materials

@@ -262,10 +262,10 @@ def _look(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
 
 def _rock(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     """Draw the rock of the demo."""
-    from imgquad_mesh.outputs.rock_picture import rock_picture
+    from imgquad_mesh.outputs.rock_picture import draw_rock
 
     out = io.BytesIO()
-    rock_picture().save(out, "PNG")
+    draw_rock().save(out, "PNG")
     return {"files": [{"name": "rock.png", "bytes": out.tell()}]}, out.getvalue()
 
 
