@@ -53,6 +53,7 @@ from .picture import (
     remove_noise,
     segment_picture,
     sizes_by_number,
+    widest_part,
 )
 from .reading import Calibration, Picture, ReadOptions, picture_of, read_picture, size_note
 
@@ -375,8 +376,15 @@ def thin_features(labels: LabelImage, mesh: QuadMesh, options: MeshOptions) -> s
 
 
 def lost_materials(done: Run) -> tuple[str, ...]:
-    """Name the materials that a tolerance took half or more of, with the remedies."""
+    """Name the materials that a tolerance took half or more of, or say that it is too wide, with the remedies."""
     names, n_pixels = done.clean.materials.name_of, done.clean.labels.size
+    if done.absorbed and not any(row.lost for row in done.absorbed) and len(done.pixel_boundary.region_label) > 1:
+        widest = widest_part(done.clean)
+        if widest <= done.options.tolerance:
+            return (
+                f"tolerance {done.options.tolerance:g} px: no part of the picture is that wide (the widest: "
+                f"{widest:.0f} px), so nothing was absorbed; lower the tolerance",
+            )
     return tuple(
         f"material {names(row.material)} loses {row.lost / row.pixels:.0%} of its area: it is thinner than "
         f"{done.options.tolerance:g} px; keep it (keep {names(row.material)}) or lower the tolerance"

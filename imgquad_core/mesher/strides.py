@@ -32,7 +32,7 @@ from .triangulation import Triangles, constraint_table, triangulate
 from .warm_up import compile_last_stages
 
 LEAST_WIDTH = 3.0  # of a face that is meshed on stride 4, in its coarse segments
-EVEN = {4: 0.7, 6: 0.8}  # of the size inside, mean edge around a face at a stride: within it the size hardly grows
+EVEN = {4: 0.6, 6: 0.8}  # of the size inside, mean edge around a face at a stride: within it the size hardly grows
 ENOUGH = 0.65  # worst element from which a face is not tried with a smaller stride
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, at least; groups at most

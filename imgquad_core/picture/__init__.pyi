@@ -1,4 +1,4 @@
-from .absorbing import Absorbed, Absorption, absorb_thin, areas_of_origin, enlarged_labels
+from .absorbing import Absorbed, Absorption, absorb_thin, areas_of_origin, enlarged_labels, widest_part
 from .editing import area_shares, edit_materials, merge_materials, recolor_materials, rename_materials
 from .legend import Legend, counts_labels, label_by, legend_of, sample_of, tally_labels
 from .marks import Marks, marks_of
@@ -44,5 +44,6 @@ __all__ = [
     "segment_picture",
     "sizes_by_number",
     "sizes_by_numbers",
+    "widest_part",
     "tally_labels",
 ]

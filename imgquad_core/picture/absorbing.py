@@ -98,6 +98,11 @@ def absorb_thin(image: LabelImage, options: AbsorbOptions) -> Absorbed:
     return Absorbed(small, enlarged, times, _accounts(before, after, times, options))
 
 
+def widest_part(image: LabelImage) -> float:
+    """Return the width of the widest part of a picture, in pixels: of a larger tolerance nothing is left to stay."""
+    return 2.0 * float(np.where(image.labels == VOID, 0.0, distances(image.labels)).max(initial=0.0))
+
+
 def enlarged_labels(labels: Labels, times: int) -> Labels:
     """Return a picture with each pixel `times` as wide and high."""
     return np.ascontiguousarray(np.repeat(np.repeat(labels, times, axis=0), times, axis=1))

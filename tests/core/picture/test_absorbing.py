@@ -9,8 +9,10 @@ from scipy.ndimage import distance_transform_edt
 
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.corner_rule import corner_rule
+from imgquad_core.options import MeshOptions
 from imgquad_core.picture import AbsorbOptions, absorb_thin, areas_of_origin
 from imgquad_core.picture.absorbing import distances, flood, near_core
+from imgquad_core.pipeline import lost_materials, run
 from support.labels import any_labels, label_image, voronoi
 
 Labels = NDArray[np.int32]
@@ -81,6 +83,15 @@ def test_a_picture_that_is_thin_all_over_keeps_a_material() -> None:
     assert len(np.unique(after)) >= 1
     tiny = absorb_thin(label_image(labels[:3, :3]), AbsorbOptions(8.0)).image.labels
     assert tiny.shape == (3, 3)
+
+
+def test_a_tolerance_wider_than_all_parts_is_told_with_the_remedy() -> None:
+    labels = stripe(3)[:20]  # 20 px high: nothing is wider
+    done = run(label_image(labels), MeshOptions(size=8.0, tolerance=32.0))
+    assert np.array_equal(done.labels.labels, labels)
+    (told,) = lost_materials(done)
+    assert "no part of the picture is that wide (the widest: 20 px)" in told
+    assert "lower the tolerance" in told
 
 
 def test_rests_have_the_area_of_what_they_are_the_rest_of() -> None:
