@@ -44,6 +44,6 @@ __all__ = [
     "segment_picture",
     "sizes_by_number",
     "sizes_by_numbers",
-    "widest_part",
     "tally_labels",
+    "widest_part",
 ]
