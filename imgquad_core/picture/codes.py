@@ -74,7 +74,16 @@ def numbered(codes: NDArray[Any], most: int) -> Numbered | None:
     order = np.argsort(found, kind="stable")
     place = np.empty(n, np.int32)
     place[order] = np.arange(n)
-    return Numbered(found[order], place[numbers])
+    put_in_place(numbers, place)
+    return Numbered(found[order], numbers)
+
+
+@kernel
+def put_in_place(numbers: Labels, of_numbers: Labels) -> None:
+    """Replace each number by what `of_numbers` gives for it, in place: large pictures have room for few copies."""
+    for r in range(numbers.shape[0]):
+        for c in range(numbers.shape[1]):
+            numbers[r, c] = of_numbers[numbers[r, c]]
 
 
 @kernel

@@ -12,7 +12,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, LabelImage, Materials
 from imgquad_core.reading.picture import Picture
 
-from .codes import codes_of, numbered, values_of_codes
+from .codes import codes_of, numbered, put_in_place, values_of_codes
 from .flat_colours import without_blends
 
 #: no limit
@@ -53,14 +53,16 @@ def exact_labels(picture: Picture, most: int, void: Flags | None, with_blends: b
             raise InputError(f"{picture.name} holds no pixel with a material: all are void")
         codes = np.where(void, codes.ravel()[void.argmin()], codes)
     found = numbered(codes, most)
+    del codes
     if found is None:
         return None
     flat = found if with_blends else without_blends(picture, found)
     labels, materials = materials_of_codes(picture, flat.codes)
-    image = labels[flat.numbers]
+    n_blends, image = len(found.codes) - len(flat.codes), flat.numbers
+    put_in_place(image, labels)
     if void is not None:
         image[void] = VOID
-    return Exact(LabelImage(image, materials), len(found.codes) - len(flat.codes))
+    return Exact(LabelImage(image, materials), n_blends)
 
 
 def with_minus_one(values: NDArray[Any], void: Flags | None) -> Flags | None:

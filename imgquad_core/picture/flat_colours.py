@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 from imgquad_core.reading.picture import Picture
 
 from .blends import find_rims, relabel_rims
@@ -19,6 +19,8 @@ from .levels import Levels, levels_of
 
 #: least contrast, in levels, of a rim between two flat colours
 RIM = 4.0
+#: connected parts of blended colours in letters have fewer pixels than this, on average
+CRUMB = 4
 #: what is so near to a colour with many times its solid pixels is the end of a ramp to it
 NEAR, MANY_TIMES = 4.0, 10
 
@@ -41,8 +43,9 @@ def without_blends(picture: Picture, found: Numbered) -> Numbered:
     Notes
     -----
     Colours that are solid nowhere (no pixel with eight equal neighbours) are blends if they outnumber the others and
-    if most of their pixels are lonely (at most one equal neighbour) or blends of two sides. A phase one pixel wide is
-    solid nowhere, too, but does not outnumber the phases around it.
+    if most of their pixels are lonely (at most one equal neighbour) or blends of two sides. Of letters, whose strokes
+    are too thin to have sides, those colours are blends whose connected parts have few pixels. A phase one pixel wide
+    is solid nowhere, too, but does not outnumber the phases around it; many cracks, each a label, have longer parts.
     """
     counts = _counts(found)
     if not _may_be_blends(counts):
@@ -60,7 +63,7 @@ class Tally(NamedTuple):
     """How the pixels of each distinct colour lie; what is counted in several pictures adds up."""
 
     codes: NDArray[Any]  #: (n,) ascending
-    counts: Ints  #: (n, 3) pixels, those with eight equal neighbours, those with one at most
+    counts: Ints  #: (n, 4) as `count_by_number` counts
     at_rims: Ints  #: (n,) pixels that are blends of their two sides
 
 
@@ -72,7 +75,7 @@ def tally_of(picture: Picture, found: Numbered) -> Tally:
 def added_up(tallies: Sequence[Tally]) -> Tally:
     """Add up what was counted in pictures of one type."""
     codes, at = np.unique(np.concatenate([tally.codes for tally in tallies]), return_inverse=True)
-    counts, at_rims = np.zeros((len(codes), 3), np.int64), np.zeros(len(codes), np.int64)
+    counts, at_rims = np.zeros((len(codes), 4), np.int64), np.zeros(len(codes), np.int64)
     np.add.at(counts, at, np.concatenate([tally.counts for tally in tallies]))
     np.add.at(at_rims, at, np.concatenate([tally.at_rims for tally in tallies]))
     return Tally(codes, counts, at_rims)
@@ -80,11 +83,17 @@ def added_up(tallies: Sequence[Tally]) -> Tally:
 
 def flat_among(tally: Tally, like: Picture) -> Flags:
     """Tell which colours are flat, not blends; all where there are no blends. `like` says what the codes stand for."""
-    nowhere = tally.counts[:, 1] == 0
-    pixels, lonely = tally.counts[nowhere, 0].sum(), tally.counts[nowhere, 2].sum()
-    if not _may_be_blends(tally.counts) or 2 * max(lonely, tally.at_rims[nowhere].sum()) <= pixels:
-        return np.ones(len(nowhere), bool)
-    return _flat(_colors(tally.codes, like), tally.counts[:, 1])
+    everything = np.ones(len(tally.codes), bool)
+    if not _may_be_blends(tally.counts):
+        return everything
+    pixels, solid, lonely, parts = tally.counts.T
+    nowhere = solid == 0
+    if 2 * max(lonely[nowhere].sum(), tally.at_rims[nowhere].sum()) <= pixels[nowhere].sum():
+        crumbs = nowhere & (pixels < CRUMB * parts)
+        if 2 * np.count_nonzero(crumbs) <= len(crumbs):
+            return everything
+        solid = np.where(nowhere & ~crumbs, 1, solid)
+    return _flat(_colors(tally.codes, like), solid)
 
 
 def in_flat_colours(picture: Picture, kept: NDArray[Any]) -> Labels:
@@ -131,8 +140,8 @@ def _give_away(labels: Labels, drawn: _Drawn, colors: Floats) -> None:
 
 
 def _counts(found: Numbered) -> Ints:
-    counts = np.zeros((len(found.codes), 3), np.int64)
-    count_by_number(found.numbers, counts)
+    counts = np.zeros((len(found.codes), 4), np.int64)
+    count_by_number(found.numbers, np.empty(found.numbers.shape[1], np.uint8), counts)
     return counts
 
 
@@ -188,16 +197,65 @@ def label_from_around(plane: Bytes, labels: Labels, pixels: Ints, means: Floats)
 
 
 @kernel
-def count_by_number(numbers: Labels, counts: NDArray[Any]) -> None:
-    """Count for each number its pixels, those with eight equal neighbours, and those with one at most."""
+def count_by_number(numbers: Labels, same: Bytes, counts: NDArray[Any]) -> None:
+    """Count for each number its pixels, those with eight equal neighbours, those with one at most, and its parts.
+
+    Of parts, those pixels are counted that no equal neighbour comes before: one, or a few, in each. `same` has room for
+    a row: how many equal neighbours come before each pixel, times 16, and after it.
+    """
     rows, cols = numbers.shape
     for r in range(rows):
+        inside = 0 < r < rows - 1 and cols > 2
+        if inside:
+            count_row(numbers, r, same)
+        start, solid, lonely, parts = 0, 0, 0, 0
         for c in range(cols):
-            number, same, around = numbers[r, c], -1, -1
-            for i in range(max(r - 1, 0), min(r + 2, rows)):
-                for j in range(max(c - 1, 0), min(c + 2, cols)):
-                    same += numbers[i, j] == number
-                    around += 1
-            counts[number, 0] += 1
-            counts[number, 1] += same == around
-            counts[number, 2] += same <= 1
+            if inside and 0 < c < cols - 1:
+                before, after, around = same[c] >> 4, same[c] & 15, 8
+            else:
+                before, after, around = count_at_frame(numbers, r, c)
+            solid += before + after == around
+            lonely += before + after <= 1
+            parts += before == 0
+            if c + 1 == cols or numbers[r, c + 1] != numbers[r, c]:
+                number = numbers[r, c]
+                counts[number, 0] += c + 1 - start
+                counts[number, 1] += solid
+                counts[number, 2] += lonely
+                counts[number, 3] += parts
+                start, solid, lonely, parts = c + 1, 0, 0, 0
+
+
+@verb
+def count_row(numbers: Labels, r: int, same: Bytes) -> None:
+    """Put the numbers of equal neighbours of the inner pixels of a row into `same`: compilers make 16 at a time."""
+    for c in range(1, numbers.shape[1] - 1):
+        own = numbers[r, c]
+        before = (
+            np.uint8(numbers[r - 1, c - 1] == own)
+            + np.uint8(numbers[r - 1, c] == own)
+            + np.uint8(numbers[r - 1, c + 1] == own)
+            + np.uint8(numbers[r, c - 1] == own)
+        )
+        after = (
+            np.uint8(numbers[r, c + 1] == own)
+            + np.uint8(numbers[r + 1, c - 1] == own)
+            + np.uint8(numbers[r + 1, c] == own)
+            + np.uint8(numbers[r + 1, c + 1] == own)
+        )
+        same[c] = 16 * before + after
+
+
+@verb
+def count_at_frame(numbers: Labels, r: int, c: int) -> tuple[int, int, int]:
+    """Return how many equal neighbours come before a pixel at the frame and after it, and how many it has."""
+    before, after, around = 0, -1, -1
+    for i in range(max(r - 1, 0), min(r + 2, numbers.shape[0])):
+        for j in range(max(c - 1, 0), min(c + 2, numbers.shape[1])):
+            equal = int(numbers[i, j] == numbers[r, c])
+            if i < r or (i == r and j < c):
+                before += equal
+            else:
+                after += equal
+            around += 1
+    return before, after, around

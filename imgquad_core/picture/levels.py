@@ -40,7 +40,10 @@ class Levels:
     void : bool, shape (n_rows, n_cols), optional
         Pixels that hold nothing; their values are those of the nearest pixel that holds one.
     shade : float64, shape (10,), optional
-        Coefficients of a cubic surface that is taken off (see `cubic`), in levels.
+        Coefficients of a cubic surface that is taken out (see `cubic`): taken off, in levels, or the logarithm of what
+        the values are divided by.
+    is_gain : bool
+        Whether the surface divides the values (light, the coil of a scanner) or is taken off (a background).
     shift, shrink : float
         What is taken off then, and what the rest is divided by, to lie in 0 to 255.
     """
@@ -50,6 +53,7 @@ class Levels:
     step: float = 1.0
     void: Flags | None = None
     shade: Floats | None = None
+    is_gain: bool = False
     shift: float = 0.0
     shrink: float = 1.0
 
@@ -70,13 +74,20 @@ class Levels:
             part = np.clip((part - np.float32(self.low)) / np.float32(self.step), 0.0, 255.0)
         if self.shade is not None:
             rows = np.arange(first, last, step)
-            surface = cubic(self.shape, rows[:, None], np.arange(self.shape[1])[None], self.shade)
-            part = (part - surface[..., None] - np.float32(self.shift)) / np.float32(self.shrink)
+            surface = cubic(self.shape, rows[:, None], np.arange(self.shape[1])[None], self.shade)[..., None]
+            dark = np.float32(self.dark)
+            part = (part - dark) * np.exp(-surface) + dark if self.is_gain else part - surface
+            part = (part - np.float32(self.shift)) / np.float32(self.shrink)
         return part
 
-    def without_shade(self, shade: Floats) -> Levels:
-        """Return levels with a surface taken off, shifted (and, where need be, shrunk) to lie in 0 to 255."""
-        flat = replace(self, shade=shade)
+    @property
+    def dark(self) -> float:
+        """Level of the value 0, which no gain changes; 0 where there are negative values, which no light makes."""
+        return -self.low / self.step if self.low > 0.0 else 0.0
+
+    def without_shade(self, shade: Floats, is_gain: bool) -> Levels:
+        """Return levels with a surface taken out, shifted (and, where need be, shrunk) to lie in 0 to 255."""
+        flat = replace(self, shade=shade, is_gain=is_gain)
         every = max(1, self.values.size // ENOUGH)
         low, high = np.quantile(flat.rows(0, self.shape[0], every), (OUTLIERS, 1.0 - OUTLIERS)).tolist()
         shift = low if low < 0.0 else max(high - 255.0, 0.0) if high - low < 255.0 else low

@@ -14,7 +14,7 @@ from .blends import find_rims, relabel_rims
 from .classes import Classes, classes_of
 from .constants import Constant, constants_of
 from .exact_colours import dark_to_light
-from .levels import NOISY, Levels, cubic, filtered_strips, noise_of, squared_gradient
+from .levels import NOISY, Levels, filtered_strips, noise_of, squared_gradient
 from .quantisation import cielab, distances2, histogram_of
 from .shading import shade_of
 from .tails import tails_of
@@ -25,8 +25,9 @@ RIM, RIM_OF_NOISE = 16.0, 16.0
 SLOPE, OF_COLOUR = 2.0, 1.7
 #: ... of greys without noise: the feet of blurred edges are no class beside the grey that they rise to
 FOOT = 1.0
-#: shading is taken out if it ranges over more standard deviations of the noise, and separates classes better so much
-SHADED, BETTER = 2.0, 1.25
+#: shading is taken out if it ranges over more standard deviations of the noise, and separates as many classes so much
+#: better, or more classes than before
+SHADED, BETTER, BETTER_AND_MORE = 2.0, 1.25, 1.1
 #: constants count if at least so much of the picture is flat beside them
 LEFT = 0.05
 #: levels by which a constant may differ from picture to picture
@@ -226,18 +227,18 @@ def _chosen(levels: Levels, smooth: Smooth, number: int | None) -> Choice:
 def _flattened(choice: Choice, noise: float, number: int | None) -> Choice:
     """Return the choice without shading, where that separates no fewer classes clearly better."""
     shade = shade_of(choice.levels, choice.smooth.plane[..., 0], noise, choice.levels.void)
-    if shade is None:
+    if shade is None or shade.span <= SHADED * noise:
         return choice
-    rows, cols = choice.levels.shape
-    surface = cubic((rows, cols), np.arange(0, rows, 4)[:, None], np.arange(0, cols, 4)[None], shade)
-    if np.ptp(surface) <= SHADED * noise:
-        return choice
-    flat = choice.levels.without_shade(shade)
+    flat = choice.levels.without_shade(shade.coefficients, shade.is_gain)
     other = _chosen(flat, smoothed(flat, noise, None), number)
-    if len(other.classes.means) < len(choice.classes.means):
-        return choice
-    before = choice.classes.separation
-    return other if other.classes.separation > BETTER * before else choice
+    n, n_before = len(other.classes.means), len(choice.classes.means)
+    factor = BETTER if n == n_before else BETTER_AND_MORE
+    return other if n >= n_before and other.classes.separation > factor * _apart(choice, n) else choice
+
+
+def _apart(choice: Choice, n: int) -> float:
+    """Return how far apart `n` classes of a choice are."""
+    return (choice if n == len(choice.classes.means) else _chosen(choice.levels, choice.smooth, n)).classes.separation
 
 
 def _by_light(means: Floats) -> Ints:

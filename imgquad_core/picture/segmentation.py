@@ -218,9 +218,10 @@ def _grains(found: Found) -> tuple[str, ...]:
 
 def overlap_of(found: Found) -> tuple[str, ...]:
     """Say if classes are not far apart."""
-    if found.separation >= APART:
+    n = len(found.means) - found.constants - found.tails
+    if found.separation >= APART or (n == 1 and found.tails):
         return ()
-    what = "the classes overlap" if len(found.means) - found.constants - found.tails > 1 else "no classes stand out"
+    what = "the classes overlap" if n > 1 else "no classes stand out"
     return (f"{what} ({found.separation:.1f} of {APART:.0f}): give their number (colors = N) or marks",)
 
 

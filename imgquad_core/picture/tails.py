@@ -10,8 +10,15 @@ from imgquad_core.arrays import Bytes, Flags, Floats
 OWN, OF_NOISE = 6.0, 1.5
 #: ... and as a part of the least distance of two classes
 OF_GAP = 0.35
+#: a peak of the histogram is a phase, too, if from so many of the class's deviations on there is a valley before it
+#: that is so many times as low
+FOOT, VALLEY = 3.0, 4.0
+#: levels that the histogram is averaged over for this
+AVERAGED = 5
 #: smallest connected part, in pixels, and share of the picture of all of them
 PIXELS, SHARE = 16, 0.001
+#: distance from a part, pixels, at which its surroundings are looked at: past the rim
+AROUND = 3
 
 
 def tails_of(plane: Bytes, support: Flags, means: Floats, noise: float) -> list[float]:
@@ -34,9 +41,11 @@ def tails_of(plane: Bytes, support: Flags, means: Floats, noise: float) -> list[
     found = []
     for side, k in ((-1, 0), (1, len(means) - 1)):
         middle, deviation = _middle_and_deviation(np.where(nearest == k, weights, 0.0))
-        least = max(OWN * deviation, OF_NOISE * noise, gap, 1.0)
+        upwards = (weights, middle) if side > 0 else (weights[::-1], 255.0 - middle)
+        far = min(OWN * deviation, _valley(*upwards, deviation))
+        least = max(far, OF_NOISE * noise, gap, 1.0)
         beyond = plane < middle - least if side < 0 else plane > middle + least
-        level = _level_of(plane, beyond, support)
+        level = _level_of(plane, beyond, support, middle)
         if level is not None:
             found.append(level)
     return found
@@ -54,8 +63,26 @@ def _middle_and_deviation(weights: Floats) -> tuple[float, float]:
     return middle, 1.4826 * float(np.interp(0.5 * sums[-1], within, away))
 
 
-def _level_of(plane: Bytes, beyond: Flags, support: Flags) -> float | None:
-    """Return the mean level of pixels `beyond` in parts that are large enough, None where these are too few."""
+def _valley(weights: Floats, middle: float, deviation: float) -> float:
+    """Return how far above `middle` the valley before another peak of a histogram lies; inf where there is none."""
+    from scipy.ndimage import uniform_filter1d
+
+    first = int(np.ceil(middle + FOOT * deviation))
+    beyond = uniform_filter1d(weights, AVERAGED)[first:]
+    if len(beyond) == 0:
+        return np.inf
+    peaks = np.flatnonzero(beyond > VALLEY * np.minimum.accumulate(beyond))
+    if len(peaks) == 0:
+        return np.inf
+    peak = peaks[beyond[peaks].argmax()]
+    return first + int(beyond[: peak + 1].argmin()) - middle
+
+
+def _level_of(plane: Bytes, beyond: Flags, support: Flags, middle: float) -> float | None:
+    """Return the mean level of pixels `beyond` in parts that are large enough, None where these are too few.
+
+    A phase ends at an edge: what is around it lies nearer to the `middle` of its neighbour. A halo fades out.
+    """
     from scipy.ndimage import label
 
     if np.count_nonzero(beyond) < SHARE * plane.size:
@@ -67,5 +94,15 @@ def _level_of(plane: Bytes, beyond: Flags, support: Flags) -> float | None:
     kept[0] = False
     if pixels[kept].sum() < SHARE * plane.size:
         return None
-    inside = kept[parts] & support
-    return float(plane[inside].mean())
+    inside = kept[parts]
+    level = float(plane[inside & support].mean())
+    return level if _ends_at_edges(plane, inside, level, middle) else None
+
+
+def _ends_at_edges(plane: Bytes, inside: Flags, level: float, middle: float) -> bool:
+    """Whether most pixels that are `AROUND` away from a part lie less than half way from `middle` to its level."""
+    from scipy.ndimage import binary_dilation
+
+    near = binary_dilation(inside, iterations=AROUND - 1)
+    around = plane[binary_dilation(near) & ~near]
+    return len(around) == 0 or abs(level - middle) > 2.0 * float(np.median(around) - middle) * np.sign(level - middle)
