@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -25,6 +24,7 @@ EXTRAS = {
     "mrc": "mrcfile",
     "zarr": "zarr",
     "hdf5": "h5py",
+    "dicom": "pydicom",
 }
 
 
@@ -143,34 +143,3 @@ def upright(values: NDArray[Any], orientation: int) -> NDArray[Any]:
     if orientation in (2, 3, 6, 7):
         values = values[:, ::-1]
     return np.ascontiguousarray(values)
-
-
-#: what is unpacked may be larger than what it stands for by this many bytes
-SLACK = 1 << 16
-
-
-def assert_unpacks(path: Path | str, data: bytes, size: int) -> None:
-    """Raise `InputError` if deflated bytes (zlib or gzip) unpack to more than `size`; memory stays below that."""
-    unpacker = zlib.decompressobj(wbits=47)  # either header
-    if len(unpacker.decompress(data, size + SLACK)) >= size + SLACK:
-        raise InputError(f"{path} unpacks to more than its {size} bytes: it is damaged, save it anew")
-
-
-def stated_size(data: bytes, codec: str) -> int:
-    """Return the size that packed bytes say they unpack to (Zstandard, Blosc, LZ4); 0 where they say nothing."""
-    if data[:4] == b"\x28\xb5\x2f\xfd":
-        return _zstd_size(data)
-    if "blosc" in codec and len(data) >= 16:
-        return int.from_bytes(data[4:8], "little")
-    if "lz4" in codec and len(data) >= 4:
-        return int.from_bytes(data[:4], "little")
-    return 0
-
-
-def _zstd_size(data: bytes) -> int:
-    """Read the size of the content from a frame's header (RFC 8878, 3.1.1.1)."""
-    flags = data[4]
-    single = bool(flags & 0x20)
-    start = 5 + (0 if single else 1) + (0, 1, 2, 4)[flags & 3]
-    n = ((1 if single else 0), 2, 4, 8)[flags >> 6]
-    return int.from_bytes(data[start : start + n], "little") + (256 if n == 2 else 0)

@@ -11,6 +11,8 @@ from typing import NamedTuple
 from imgquad_core.errors import InputError
 
 from .decoding import NoSuchPicture
+from .dicom import MAGIC as DICM
+from .dicom import PREAMBLE, read_dicom
 from .ebsd_maps import read_ang, read_ctf
 from .hdf5_files import read_hdf5
 from .info_bar import cut_info_bar
@@ -50,6 +52,7 @@ FORMATS = (
     Format("OME-Zarr", (".zarr",), read_zarr, "zarr"),
     Format("NRRD", (".nrrd", ".nhdr"), read_nrrd, "nrrd"),
     Format("NIfTI", (".nii", ".nii.gz"), read_nifti, "nifti"),
+    Format("DICOM", (".dcm", ".dicom", ".ima"), read_dicom, "dicom"),
     Format("MRC", (".mrc", ".mrcs", ".map", ".rec", ".st"), read_mrc, "mrc"),
 )  # fmt: skip
 
@@ -61,7 +64,6 @@ CONVERTED_BY: Mapping[str, str] = {
     ".cpr": "export the map as .ctf (Channel 5: Save as; AZtec: Export)",
     ".crc": "export the map as .ctf (Channel 5: Save as; AZtec: Export)",
     ".osc": "export the map as .ang from OIM Analysis (File, Export, Scan data)",
-    ".dcm": "pip install pydicom, then numpy.save('x.npy', pydicom.dcmread(FILE).pixel_array)",
     ".czi": "pip install czifile, then tifffile.imwrite('x.tif', czifile.imread(FILE).squeeze())",
     ".lif": "pip install liffile, then numpy.save('x.npy', liffile.LifFile(FILE).images[0].asarray())",
     ".dm3": "pip install rosettasciio, then numpy.save('x.npy', rsciio.digitalmicrograph.file_reader(FILE)[0]['data'])",
@@ -169,6 +171,8 @@ def format_of(path: Path) -> Format:
     by_name = _by_name("".join(suffixes)) or (_by_name(suffixes[-1]) if suffixes else None)
     if by_name is not None and by_name.read not in (read_by_pillow, read_tiff):
         return by_name
+    if start[PREAMBLE:].startswith(DICM):  # before TIFF: its preamble may hold a TIFF header
+        return _named(".dcm")
     if start.startswith(MAGIC):
         return _named(".tif")
     if start.startswith(b"\x89HDF\r\n\x1a\n"):
@@ -187,7 +191,7 @@ _PICTURES = (b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"RIFF", *(b"P%d" % k 
 def _first_bytes(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            start = file.read(16)
+            start = file.read(PREAMBLE + len(DICM))
     except OSError as error:
         raise InputError(f"cannot open the picture {path} ({error.strerror}): give a file that can be read") from error
     if not start:
@@ -196,7 +200,7 @@ def _first_bytes(path: Path) -> bytes:
 
 
 #: a few more, for messages
-_OTHERS = ("npy", "npz", "ang", "ctf", "h5oina", "dream3d", "zarr", "nrrd", "nii", "mrc", "vti", "mha")
+_OTHERS = ("npy", "npz", "ang", "ctf", "h5oina", "dream3d", "zarr", "nrrd", "nii", "mrc", "dcm", "vti", "mha")
 
 
 def _by_name(extension: str) -> Format | None:

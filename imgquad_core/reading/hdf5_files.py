@@ -14,10 +14,11 @@ from imgquad_core.errors import InputError
 
 from .calibration import Calibration, PixelSize, size_of
 from .crystal_map import CrystalMap, Phase, crystal_picture, crystals_of, grain_names
-from .decoding import Stack, assert_pixels, assert_unpacks, decoding, optional
+from .decoding import Stack, assert_pixels, decoding, optional
 from .grains import LAUE_GROUPS, quaternions_of
 from .numpy_files import chosen_array
 from .options import ReadOptions
+from .packed import DEFLATE, assert_unpacks
 from .picture import Picture, picture_of
 
 #: the array of grain numbers that DREAM.3D makes
@@ -157,7 +158,7 @@ def _assert_sound(path: Path, dataset: Any, options: ReadOptions) -> None:
         return
     for k in range(dataset.id.get_num_chunks()):
         chunk = dataset.id.get_chunk_info(k)
-        if chunk.size * 1032 > 4 * size:
+        if chunk.size * DEFLATE > 4 * size:
             assert_unpacks(path, dataset.id.read_direct_chunk(chunk.chunk_offset)[1], size)
 
 
