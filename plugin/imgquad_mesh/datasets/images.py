@@ -19,6 +19,7 @@ from .placement import Placement
 
 #: cell array of the values as `imgquad_mesh.read` gives them, and what it stores beside them
 PICTURE, VOID_PIXELS, OPAQUE, PALETTE = "picture", "void", "opaque", "palette"
+OF_VTK_TIFF = "Tiff Scalars"  #: what VTK's reader of TIFF calls its array
 MATERIAL = "material"  #: array that a segmented image has
 QUANTISED = "material_quantised"  #: field array: 1 where colours were quantised and noise is not removed yet
 
@@ -103,7 +104,8 @@ def segmented(
     name, _ = scalars_of(image, scalars)
     values, options = image_array(image, name), options or core.picture.SegmentationOptions()
     if name != MATERIAL or NUMBERS not in image.field_data or options.colors not in ("auto", "exact"):
-        return _segmented(_picture(image, name, values), options)
+        found = _segmented(_picture(image, name, values), options)
+        return replace(found, warnings=(*garbled(name, values), *found.warnings))
     materials = materials_of(image)
     unknown = np.setdiff1d(values, [-1, *materials.labels])
     if len(unknown):
@@ -115,6 +117,17 @@ def segmented(
 def _segmented(raw: core.reading.Picture, options: core.picture.SegmentationOptions) -> core.picture.Segmentation:
     found = core.picture.segment_picture(raw, options)
     return replace(found, image=core.picture.as_told(found.image, raw))
+
+
+def garbled(name: str, values: NDArray[Any]) -> tuple[str, ...]:
+    """Say where an image looks as VTK's reader of TIFF garbles it (9.4 to 9.7), as far as that can be told."""
+    channels = values.shape[2] if values.ndim == 3 else 1
+    is_deep = channels >= 3 and values.dtype.itemsize > 1
+    is_clear = channels == 4 and not values[..., 3].any()
+    if name != OF_VTK_TIFF or not (is_deep or is_clear):
+        return ()
+    what = "colours of more than 8 bits" if is_deep else "alpha"
+    return (f"VTK's reader gets {what} in TIFF files wrong: read the file by imgquad_mesh.read(path)",)
 
 
 def _picture(image: pv.ImageData, name: str, values: NDArray[Any]) -> core.reading.Picture:

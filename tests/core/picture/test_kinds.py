@@ -126,3 +126,20 @@ def test_veins_of_one_pixel_are_materials_though_they_are_solid_nowhere() -> Non
 def test_real_pictures_are_of_the_kind_that_their_catalogue_says(images: Path) -> None:
     for path in sorted(images.glob("*.*g")):
         assert kind_of(read_picture(path)).is_labels == (path.stem not in RAW), path.name
+
+
+def test_letters_have_the_colours_they_were_drawn_in_and_cracks_keep_their_labels() -> None:
+    from PIL import Image, ImageDraw
+
+    page = Image.new("L", (300, 200), 0)
+    draw = ImageDraw.Draw(page)
+    draw.rectangle((0, 0, 120, 60), fill=252)
+    for k in range(10):
+        draw.text((10, 70 + 12 * k), f"EHT = {k}.00 kV  WD = 3.9 mm  Mag = 50.00 K X", fill=252)
+    letters = np.asarray(page)
+    if len(np.unique(letters)) > 8:  # Pillow with FreeType draws blends
+        assert segment(letters).materials.labels.tolist() == [0, 252]
+    cracks = np.zeros((200, 200), np.uint16)
+    for k in range(40):
+        cracks[5 * k, 3 * k % 60 : 3 * k % 60 + 90] = k + 1
+    assert len(segment(cracks).materials.labels) == 41

@@ -195,3 +195,29 @@ def test_a_number_and_a_palette_keep_filter_and_rims(n: int) -> None:
     for found in (number, palette):
         assert found.smoothed
         assert (remove_noise(found.image, automatic_limits(True, truth.shape)).labels == truth).mean() > 0.9
+
+
+@pytest.mark.parametrize("shade", [0.1, 0.2, 0.3])
+def test_light_that_multiplies_is_taken_out_of_thin_and_thick_tissues(shade: float) -> None:
+    y, x = np.mgrid[:256, :256] + 0.5
+    r, t = np.hypot(x - 128, (y - 128) / 1.15), np.arctan2(y - 128, x - 128)
+    wavy = 86 + 2 * np.cos(9 * t), 66 + 8 * np.cos(7 * t)
+    tissue = np.select([r > 105, r > 98, r > 90, r > wavy[0], r > wavy[1]], [0, 1, 2, 3, 4], 5)
+    grey = np.array([10, 150, 60, 35, 110, 185.0])[tissue] * (1 + shade * (x - 128) / 128)
+    grey = ndimage.gaussian_filter(grey, 0.7) + np.random.default_rng(0).normal(0, 6, grey.shape)
+    found = segment_picture(grey.clip(0, 255).astype(np.uint8))
+    assert "uneven light taken out" in found.note
+    assert np.mean(found.image.labels == np.array([0, 4, 2, 1, 3, 5])[tissue]) > 0.98
+
+
+def test_few_bright_particles_in_a_noisy_matrix_are_a_phase_and_a_halo_is_none() -> None:
+    random = np.random.default_rng(3)
+    y, x = np.mgrid[:300, :300]
+    away = np.min([np.hypot(y - r, x - c) for r, c in random.integers(20, 280, (12, 2))], axis=0)
+    matrix = 130 + 15 * np.sin(x / 40.0) + random.normal(0, 20, x.shape)
+    particles = np.where(away < 7, 245 + random.normal(0, 6, x.shape), matrix)
+    found = segment_picture(particles.clip(0, 255).astype(np.uint8))
+    assert np.mean((found.image.labels == 1) == (away < 7)) > 0.99
+    assert "rare" in found.note
+    halo = 130 + 100 * np.exp(-away / 8) + random.normal(0, 1, x.shape)
+    assert "rare" not in segment_picture(halo.clip(0, 255).astype(np.uint8)).note

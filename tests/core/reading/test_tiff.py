@@ -250,3 +250,17 @@ def test_samples_of_instruments(samples: Path) -> None:
     cog = read_picture(samples / "cogeo.tif")
     assert cog.values.shape == (1024, 1024, 3)
     assert cog.calibration.crs == "EPSG:3857"
+
+
+def test_no_data_of_a_palette_map_is_void(tmp_path: Path) -> None:
+    values = (GREY % 7).astype(np.uint8)
+    values[5:9, 3:20] = 255
+    table = np.random.default_rng(0).integers(0, 65536, (3, 256)).astype(np.uint16)
+    tags = [(42113, "s", 4, "255", True)]
+    path = written(tmp_path / "a.tif", values, photometric="palette", colormap=table, extratags=tags)
+    picture = read_picture(path)
+    assert picture.palette is not None
+    assert picture.void is not None
+    assert np.argwhere(picture.void).tolist() == [[r, c] for r in range(5, 9) for c in range(3, 20)]
+    assert (picture.values[~picture.void] == values[~picture.void]).all()
+    assert picture.values.max() < 7

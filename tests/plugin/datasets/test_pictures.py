@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +97,20 @@ def test_what_vtks_own_reader_garbles_comes_right(tmp_path: Path, options: dict[
     image = imgquad_mesh.read(tmp_path / "a.tif")
     assert (image_array(image) == values).all()
     assert image.bounds[:4] == (0, 70, 0, 50)
+
+
+def test_an_image_as_vtk_garbles_it_is_told_with_the_remedy(tmp_path: Path) -> None:
+    deep = np.dstack([LABELS * 20000] * 3).astype(np.uint16)
+    tifffile.imwrite(tmp_path / "a.tif", deep, photometric="rgb")
+    with pytest.warns(UserWarning, match=r"more than 8 bits in TIFF files wrong.*imgquad_mesh\.read"):
+        pv.read(tmp_path / "a.tif").imgquad.segment()
+    right = imgquad_mesh.read(tmp_path / "a.tif").imgquad.segment()
+    assert np.bincount(right["material"]).tolist() == [LABELS.size - 240, 240]
+    grey = (LABELS * 100).astype(np.uint8)
+    tifffile.imwrite(tmp_path / "b.tif", grey)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pv.read(tmp_path / "b.tif").imgquad.segment()
 
 
 def test_colours_palettes_and_void_come_with_the_image(tmp_path: Path) -> None:
