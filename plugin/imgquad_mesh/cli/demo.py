@@ -34,4 +34,5 @@ def execute(args: argparse.Namespace) -> int:
     options = core.MeshOptions(size=5.0, min_pixels=12, min_length=6)
     code = mesh_to_files(picture, options, files)
     print(f"look at {picture} and {files.picture}; open {files.mesh} in ParaView or with pyvista.read")
+    print(f"or do the same on a page in the browser: imgquad-mesh studio {picture}")
     return code

@@ -166,10 +166,12 @@ def _denoise(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
 
 def _smooth(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     _run(desk, task, tell, "smooth")
-    graph, part = desk.memory["boundary"], desk.memory["labels"].shape
-    frame = packing.Frame(part, graph.shape, recipe_of(task["recipe"]).options.crop)
-    listed, data = packing.packed(packing.pack_lines(graph, frame))
-    return {"chains": graph.n_chains, "regions": len(graph.region_label), "arrays": listed}, data
+    graph, image = desk.memory["boundary"], desk.memory["labels"]
+    frame = packing.Frame(image.shape, graph.shape, recipe_of(task["recipe"]).options.crop)
+    places = packing.label_places(image.labels, image.materials)
+    listed, data = packing.packed({**packing.pack_lines(graph, frame), "labels": places})
+    told = {"chains": graph.n_chains, "regions": len(graph.region_label), "arrays": listed}
+    return told | {"rows": image.shape[0], "columns": image.shape[1]}, data
 
 
 def _mesh(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:

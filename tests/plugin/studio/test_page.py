@@ -290,7 +290,7 @@ def test_a_downloaded_mesh_is_the_commands_file(extension: str, page: Any, rock:
     page.select_option("#format", extension)
     command(page, extension)
     got = []
-    page.on("download", got.append)
+    page.on("download", lambda download: got.append(download))
     page.click("#get-mesh")
     n = 2 if extension == ".xdmf" else 1
     end = time.monotonic() + 60

@@ -146,7 +146,7 @@ function take(stage, result) {
     view?.setLabels("before", result.arrays.labels);
   }
   if (!view) return;
-  if (stage === "denoise") view.setLabels("after", result.arrays.labels, partOf(result));
+  if (result.arrays.labels && stage !== "segment") view.setLabels("after", result.arrays.labels, partOf(result));
   if (stage === "smooth") view.setLines(result.arrays.lines);
   if (stage === "mesh") {
     view.setQuads(result.arrays);
@@ -186,7 +186,8 @@ function paint() {
   view.shown = { picture: true, lines: shown === "boundaries", quads: isMesh };
   view.opacity = shown === "picture" ? 0 : shown === "boundaries" ? Math.min(0.25, at("opacity").value) : Number(at("opacity").value);
   at("split").hidden = !(step === 1 && shown === "materials" && view.labels?.after);
-  view.split = at("split").hidden ? 9 : Number(at("split").getAttribute("aria-valuenow")) / 100;
+  view.split = shown === "boundaries" ? 0 : at("split").hidden ? 9 : Number(at("split").getAttribute("aria-valuenow")) / 100;
+  at("tint").hidden = isMesh || shown === "picture";
   const rows = materials(), colors = rows.map((row) => (row.out ? null : row.color));
   view.setPalette(isMesh ? app.results.mesh.materials.map((row, k) => (fresh("segment") && colors[k]) || row.color) : colors);
   view.soon();

@@ -173,7 +173,7 @@ export function mesh(app) {
   const figures = h("dl", { class: "figures" }), warning = h("p", { class: "warn", hidden: true }), bars = h("div", { id: "histogram", role: "group", "aria-label": "Scaled Jacobian: number of quads" });
   const worst = h("div", { id: "worst", role: "group", "aria-label": "Worst quads" });
   const again = button("Mesh", () => app.meshNow(), { class: "primary", id: "meshnow" }), sizes = h("details");
-  const shade = choice("Colours", "shade", [["material", "material"], ["jacobian", "scaled Jacobian"]], () => (app.view?.shaded ? "jacobian" : "material"), (value) => app.shade(value === "jacobian"));
+  const shade = choice("Colours", "shade", [["material", "material"], ["jacobian", "scaled Jacobian, red 0 to blue 1"]], () => (app.view?.shaded ? "jacobian" : "material"), (value) => app.shade(value === "jacobian"));
   let shown;
   live(() => {
     again.disabled = app.fresh("mesh");
@@ -300,16 +300,18 @@ function extras(app) {
   return made;
 }
 
+const VALUES = { young: "Young's modulus", poisson: "Poisson's ratio", conductivity: "conductivity" };
+
 function valuesOf(app, deck) {
   const keys = Object.entries(NEEDED[deck]), rows = app.materials().filter((row) => !row.out).slice(0, 50);
   const cell = ({ base, name }, [key, usual]) => {
-    const input = h("input", { type: "number", step: "any", placeholder: usual, "aria-label": `${key} of ${name}`, id: `${key}-${base}`, onchange: () => {
+    const input = h("input", { type: "number", step: "any", placeholder: usual, "aria-label": `${VALUES[key]} of ${name}`, id: `${key}-${base}`, onchange: () => {
       const { [key]: former, ...others } = current().output.values[base] ?? {};
       setOutput({ values: { ...current().output.values, [base]: input.value === "" ? others : { ...others, [key]: Number(input.value) } } });
     } });
     input.value = current().output.values[base]?.[key] ?? "";
     return h("td", {}, input);
   };
-  return h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Values of the materials" }, h("p", { class: "note" }, "In units that fit together; 1 (Poisson's ratio .3) where nothing is given."),
-    h("table", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "material"), keys.map(([key]) => h("th", { scope: "col" }, key)))), h("tbody", {}, rows.map((row) => h("tr", {}, h("th", { scope: "row" }, row.name), keys.map((key) => cell(row, key)))))));
+  return h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Values of the materials" }, h("p", { class: "note" }, "In units that fit together; a modulus of 1 and a ratio of 0.3 where nothing is given."),
+    h("table", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "material"), keys.map(([key]) => h("th", { scope: "col" }, VALUES[key])))), h("tbody", {}, rows.map((row) => h("tr", {}, h("th", { scope: "row" }, row.name), keys.map((key) => cell(row, key)))))));
 }
