@@ -88,7 +88,7 @@ def _mesh_options(values: dict[str, Any]) -> MeshOptions:
             raise InputError(f"{name!r} is no option of the studio")
     try:
         return MeshOptions(**{name: _natural(name, value) for name, value in values.items()})
-    except (TypeError, ValueError, KeyError) as error:
+    except (AttributeError, TypeError, ValueError, KeyError) as error:  # of another type than the page sends
         raise error if isinstance(error, InputError) else InputError(f"an option cannot be used: {error}") from error
 
 
