@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import json
+import pickle
 import re
 import sys
 import traceback
@@ -18,18 +19,22 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
+from imgquad_core.declared import declarations
 from imgquad_core.errors import ImgquadError, InputError
+from imgquad_core.fe.properties import read_properties
 from imgquad_core.ledger import material_ledger
 from imgquad_core.measures import quality_report
 from imgquad_core.measures.quality import bad_places
 from imgquad_core.model import LabelImage, Materials
 from imgquad_core.options import MeshOptions
-from imgquad_core.picture import area_shares
+from imgquad_core.picture import Segmentation, SegmentationOptions, area_shares, list_removed
 from imgquad_core.pipeline import STAGES, Memory, Run, run
-from imgquad_core.reading import Picture, ReadOptions
-from imgquad_mesh.outputs.files import mesh_extensions
-from imgquad_mesh.outputs.mesh_picture import material_colors
+from imgquad_core.reading import Picture, ReadOptions, read_picture
+from imgquad_core.reading.formats import OF_VTK
+from imgquad_core.writers.neighbours import files_of
+from imgquad_mesh import outputs
 
 from . import packing
 from .recipe import PROPERTIES, Recipe, recipe_of
@@ -47,17 +52,44 @@ class Desk:
     pixels: int
     memory: Memory = field(default_factory=Memory)
     raw: dict[tuple[str, ReadOptions], Picture] = field(default_factory=dict)
+    kept: Segmentation | None = None  #: the one that is in the folder, too
 
     def picture(self, task: Mapping[str, Any], options: MeshOptions) -> Picture:
         """Return the page's picture, read once; the last one only is kept."""
-        from imgquad_mesh.datasets.pictures import read_any
-
         reading = replace(options.reading(), crop=None, max_pixels=self.pixels)
         key = task["file"], reading
         if key not in self.raw:
             _assert_whole(self.folder / task["file"], task["name"])
-            self.raw = {key: read_any(self.folder / task["file"], reading, task["name"])}
+            self.raw = {key: _read(self.folder / task["file"], reading, task["name"])}
         return self.raw[key]
+
+    def recall(self, task: Mapping[str, Any], options: MeshOptions) -> None:
+        """Take the segmentation from the folder, where a worker that was killed has left one of the same."""
+        if self.kept is None and self._segmentation.exists():
+            kept = pickle.loads(self._segmentation.read_bytes())  # our own: uploads have other names
+            if kept[:2] == (task["file"], options):
+                self.memory("segmentation", lambda *_: kept[2], self.picture(task, options), options.segmentation())
+                self.kept = self.memory["segmentation"]
+
+    def keep(self, task: Mapping[str, Any], options: MeshOptions) -> None:
+        """Leave the segmentation in the folder: it takes most of the time that a picture takes."""
+        found = self.memory["segmentation"]
+        if found is not self.kept:
+            kept = pickle.dumps((task["file"], options, found), pickle.HIGHEST_PROTOCOL)
+            outputs.replace_file(self._segmentation, lambda temporary: temporary.write_bytes(kept))
+            self.kept = found
+
+    @property
+    def _segmentation(self) -> Path:
+        return self.folder / "segmentation"
+
+
+def _read(path: Path, options: ReadOptions, name: str) -> Picture:
+    if path.suffix not in OF_VTK:
+        return read_picture(path, options, name)
+    from imgquad_mesh.datasets.pictures import read_any  # loads VTK, which no other picture needs
+
+    return read_any(path, options, name)
 
 
 #: how headers name the file of their data; an upload has none beside it, and must not reach for others
@@ -102,6 +134,10 @@ def _answer(desk: Desk, task: Mapping[str, Any], pipe: Connection) -> None:
             pipe.send_bytes(data)
 
 
+#: options that reading and segmentation hang on
+_EARLY = [name for of in (ReadOptions, SegmentationOptions) for name in declarations(of)]
+
+
 class _Enough(Exception):
     """The last stage that was asked for is done."""
 
@@ -109,13 +145,17 @@ class _Enough(Exception):
 def _run(desk: Desk, task: Mapping[str, Any], tell: Tell, until: str) -> Run | None:
     """Run the pipeline through a stage; None where it is not the last: the values are in the memory."""
     recipe = _recipe(desk, task)
+    early = MeshOptions(**{name: getattr(recipe.options, name) for name in _EARLY})
 
     def progress(stage: str, number: int, total: int) -> None:
+        if stage == "denoise":
+            desk.keep(task, early)
         if number > STAGES.index(until):
             raise _Enough
         tell({"stage": stage, "number": number, "of": STAGES.index(until) + 1})
 
     tell({"stage": "read", "number": 0, "of": STAGES.index(until) + 1})
+    desk.recall(task, early)
     try:
         return run(desk.picture(task, recipe.options), recipe.options, progress, desk.memory)
     except _Enough:
@@ -137,7 +177,7 @@ def _segment(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     listed, data = packing.packed({"labels": packing.label_places(edited.labels, edited.materials)})
     rows, cols = edited.shape
     told = {"note": found.note, "warnings": list(found.warnings), "rows": rows, "columns": cols}
-    told["formats"] = list(mesh_extensions())
+    told["formats"] = list(outputs.mesh_extensions())
     told["notes"] = list(desk.picture(task, recipe_of(task["recipe"]).options).notes)
     return told | {"base": _base(found.image.materials), "materials": _table(edited), "arrays": listed}, data
 
@@ -147,12 +187,10 @@ def _base(materials: Materials) -> dict[str, str]:
 
 
 def _table(image: LabelImage) -> list[dict[str, Any]]:
-    return packing.material_rows(image, area_shares(image), material_colors(image.materials))
+    return packing.material_rows(image, area_shares(image), outputs.material_colors(image.materials))
 
 
 def _denoise(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
-    from imgquad_core.picture import list_removed
-
     _run(desk, task, tell, "denoise")
     recipe, clean, found = recipe_of(task["recipe"]), desk.memory["clean"], desk.memory["segmentation"]
     before = desk.memory["picture"] if recipe.options.crop else desk.memory["edited"]
@@ -196,9 +234,6 @@ def _worst(done: Run) -> list[dict[str, Any]]:
 
 def _write(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     """Write one of the outputs of the command and hand over what was written."""
-    from imgquad_core.writers.neighbours import files_of
-    from imgquad_mesh.outputs import files
-
     start = perf_counter()
     done = _run(desk, task, tell, "mesh")
     assert done is not None
@@ -209,17 +244,15 @@ def _write(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     stem = Path(recipe.picture).stem
     path = folder / (recipe.file if what == "mesh" else f"{stem}{_OTHERS[what]}")
     if what == "mesh":
-        files.check_target(path, files.mesh_extensions())
-        files.write_run(done, path, recipe.output.elements, **_writer_options(recipe, folder))
+        outputs.check_target(path, outputs.mesh_extensions())
+        outputs.write_run(done, path, recipe.output.elements, **_writer_options(recipe, folder))
     elif what == "report":
-        from imgquad_mesh.outputs.report import build_report
-
         seconds = {**done.seconds, "total": perf_counter() - start}
-        files.write_json(build_report(done, Path(recipe.picture), Path(recipe.file), seconds), path)
+        outputs.write_json(outputs.build_report(done, Path(recipe.picture), Path(recipe.file), seconds), path)
     elif what == "picture":
-        files.write_picture(done.mesh, path)
+        outputs.write_picture(done.mesh, path)
     else:
-        files.write_labels(done.labels, path)
+        outputs.write_labels(done.labels, path)
     return _handed_over([each for each in files_of(path) if each.exists()])
 
 
@@ -228,8 +261,6 @@ _OTHERS = {"report": ".report.json", "picture": ".mesh.png", "labels": ".labels.
 
 
 def _writer_options(recipe: Recipe, folder: Path) -> dict[str, Any]:
-    from imgquad_core.fe.properties import read_properties
-
     given: dict[str, Any] = dict(recipe.output.writer)
     if recipe.output.properties:
         (folder / PROPERTIES).write_text(recipe.output.properties, encoding="utf-8")
@@ -247,8 +278,6 @@ def _handed_over(paths: list[Path]) -> Answer:
 
 def _look(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     """Show a picture that browsers cannot: its values from black to white, as PNG."""
-    from PIL import Image
-
     picture = desk.picture(task, recipe_of(task["recipe"]).options)
     step = -(-max(picture.shape) // packing.LARGEST)
     values = picture.values[::step, ::step]
@@ -264,10 +293,8 @@ def _look(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
 
 def _rock(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     """Draw the rock of the demo."""
-    from imgquad_mesh.outputs.rock_picture import draw_rock
-
     out = io.BytesIO()
-    draw_rock().save(out, "PNG")
+    outputs.draw_rock().save(out, "PNG")
     return {"files": [{"name": "rock.png", "bytes": out.tell()}]}, out.getvalue()
 
 

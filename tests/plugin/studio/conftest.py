@@ -64,8 +64,8 @@ def page(open_page: Callable[..., Any]) -> Any:
 @pytest.fixture
 def rock(tmp_path: Path) -> Path:
     """The rock of the demo, as a picture of 200 x 140 pixels."""
-    from imgquad_mesh.outputs.rock_picture import rock_picture
+    from imgquad_mesh.outputs import draw_rock
 
     path = tmp_path / "rock.png"
-    rock_picture().crop((0, 0, 200, 140)).save(path)
+    draw_rock().crop((0, 0, 200, 140)).save(path)
     return path

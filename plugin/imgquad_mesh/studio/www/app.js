@@ -34,6 +34,7 @@ async function open(blob, name) {
     at("name").textContent = picture.name;
     go(0);
   } catch (error) {
+    at("drop").hidden = Boolean(picture);
     say(error.message);
   }
 }

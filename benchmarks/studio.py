@@ -1,0 +1,181 @@
+"""Times of the studio in a real browser, beside the bars: `python benchmarks/studio.py [COLUMNS ROWS SIZE]`.
+
+Prints wall seconds, and CPU seconds of the worker where these say more on a machine that others use.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from support.studio import Studio, running_studio
+
+#: seconds, but for those that say what they are; docs/benchmarks.md tells how they were chosen
+BARS = {
+    "command to page": 1.5, "picture seen": 0.3, "classes": 5.0, "noise slider": 1.0, "smoothing": 2.0,
+    "mesh there": 3.0, "mesh shown": 1.0, "frame, median ms": 17, "frame, p95 ms": 40, "redraw": 0.4,
+    "worst element": 0.5, "cancel": 0.5, "ping, median ms": 10, "ping, most ms": 100, "MB of the server": 80,
+    "MB of the fork server": 250, "MB of the worker, peak": 400, "MB of the page's heap": 50,
+}  # fmt: skip
+
+
+def rock(columns: int, rows: int) -> Image.Image:
+    """Five phases with noise of the grain."""
+    from imgquad_mesh.outputs.rock_picture import rock_labels
+
+    rng = np.random.default_rng(1)
+    levels = np.array([60, 95, 130, 165, 200, 20], float)[rock_labels(columns, rows, noise=0.0)]
+    return Image.fromarray(np.clip(levels + rng.normal(0, 7, levels.shape), 0, 255).astype(np.uint8))
+
+
+def memory(pid: int) -> dict[str, float]:
+    """MB that a process has and has had at most."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    found = {line.split(":")[0]: float(line.split()[1]) / 1e3 for line in lines if line.startswith("Vm")}
+    return {"now": found["VmRSS"], "peak": found["VmHWM"]}
+
+
+def children(pid: int) -> list[int]:
+    found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [int(child) for child in found]
+
+
+def cpu(pid: int) -> float:
+    parts = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(parts[11]) + int(parts[12])) / os.sysconf("SC_CLK_TCK")
+
+
+class Bench:
+    """A page, and the times of what is done on it."""
+
+    def __init__(self, studio: Studio, page: Any) -> None:
+        self.studio, self.page = studio, page
+
+    def until(self, expression: str) -> None:
+        while not self.page.evaluate(expression):
+            time.sleep(0.01)
+
+    @property
+    def workers(self) -> list[int]:
+        """The fork server's children."""
+        return [each for server in children(self.studio.process.pid) for each in children(server)]
+
+    def timed(self, name: str, act: Callable[[], Any], expression: str) -> None:
+        before = sum(map(cpu, self.workers))
+        start = time.perf_counter()
+        act()
+        self.until(expression)
+        wall = time.perf_counter() - start
+        self.told(name, wall, f", worker {sum(map(cpu, self.workers)) - before:.2f} s of CPU")
+
+    def told(self, name: str, value: float, more: str = "") -> None:
+        print(f"{name:24} {value:8.2f}   bar {BARS[name]:g}{more}", flush=True)
+
+
+def fresh(stage: str) -> str:
+    return f"studio.fresh('{stage}') && !document.body.hasAttribute('data-busy')"
+
+
+def measure(bench: Bench, picture: Path, size: float) -> None:
+    page, studio = bench.page, bench.studio
+    bench.timed("picture seen", lambda: page.set_input_files("#file", str(picture)), "studio.view.size[0] > 1")
+    start = time.perf_counter()
+    bench.until(fresh("segment"))
+    bench.told("classes", time.perf_counter() - start)
+    page.click("#step1")
+    bench.until(fresh("denoise"))
+    slide = "([id, v]) => { const e = document.getElementById(id); e.value = v; e.dispatchEvent(new Event('input')); }"
+    page.evaluate(slide, ["min_length", 12])
+    bench.until(fresh("denoise"))
+    bench.timed("noise slider", lambda: page.evaluate(slide, ["min_pixels", 144]), fresh("denoise"))
+    page.evaluate(slide, ["size", size]) if page.locator("#size").count() else None
+    bench.timed("smoothing", lambda: page.click("#step2"), fresh("smooth"))
+    page.click("#step3")
+    page.evaluate(slide, ["size", size])
+    time.sleep(0.3)
+    ping = []
+    start = time.perf_counter()
+    before = sum(map(cpu, bench.workers))
+    page.click("#meshnow", force=True)
+    while not page.evaluate("Boolean(studio.results.mesh)"):
+        asked = time.perf_counter()
+        studio.ask("GET", "/icon.svg")
+        ping.append(1000 * (time.perf_counter() - asked))
+        time.sleep(0.02)
+    used = sum(map(cpu, bench.workers)) - before
+    bench.told("mesh there", time.perf_counter() - start, f", worker {used:.2f} s of CPU")
+    print(page.evaluate("studio.results.mesh.quality.n_quads"), "quads")
+    bench.told("ping, median ms", statistics.median(ping))
+    bench.told("ping, most ms", max(ping))
+    cost = "(() => { const s = performance.now(); studio.view.draw(); return (performance.now() - s) / 1000; })()"
+    bench.told("redraw", page.evaluate(cost))
+    box = page.locator("#canvas").bounding_box()
+    page.evaluate(
+        "() => { globalThis.ticks = []; let last = performance.now(); const tick = (now) => {"
+        " ticks.push(now - last); last = now; if (ticks.length < 400) requestAnimationFrame(tick); };"
+        " requestAnimationFrame(tick); }"
+    )
+    page.mouse.move(box["x"] + 200, box["y"] + 200)
+    page.mouse.down()
+    for k in range(120):
+        page.mouse.move(box["x"] + 200 + 2 * k, box["y"] + 200 + k)
+    page.mouse.up()
+    ticks = sorted(page.evaluate("ticks.slice(3)"))
+    bench.told("frame, median ms", statistics.median(ticks))
+    bench.told("frame, p95 ms", ticks[int(0.95 * (len(ticks) - 1))])
+    worst = page.locator("#worst button").first
+    bench.timed("worst element", worst.click, "Boolean(studio.view.mark)")
+    bench.told("MB of the server", memory(studio.process.pid)["now"])
+    servers = [pid for pid in children(studio.process.pid) if children(pid)]
+    bench.told("MB of the fork server", memory(servers[0])["now"])
+    bench.told("MB of the worker, peak", max(memory(pid)["peak"] for pid in bench.workers))
+    bench.told("MB of the page's heap", page.evaluate("performance.memory.usedJSHeapSize / 1e6"))
+    page.evaluate(slide, ["size", 0.98 * size])
+    page.click("#meshnow")
+    bench.until("document.getElementById('stage').textContent === 'meshing'")
+    bench.timed("cancel", lambda: page.click("#cancel"), "!document.body.hasAttribute('data-busy')")
+
+
+def main() -> None:
+    from playwright.sync_api import sync_playwright
+
+    columns, rows, size = (float(each) for each in (sys.argv[1:] or (2200, 2200, 4)))
+    print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores; {columns:g} x {rows:g} pixels, size {size:g}")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        picture = Path(folder) / "rock.png"
+        rock(int(columns), int(rows)).save(picture)
+        start = time.perf_counter()
+        with running_studio(Path(folder)) as studio:
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium"),
+                args=["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--enable-precise-memory-info"],
+            )
+            up = time.perf_counter() - start
+            page = browser.new_page(viewport={"width": 1280, "height": 800})
+            page.set_default_timeout(600_000)
+            begun = time.perf_counter()
+            page.goto(studio.address)
+            page.wait_for_selector("body[data-ready]")
+            bench = Bench(studio, page)
+            bench.told("command to page", time.perf_counter() - begun, f" (with command and browser {up:.1f} more)")
+            page.click("#rock")  # the fork server is ready when the first worker answers
+            bench.until(fresh("segment"))
+            page.reload()
+            page.wait_for_selector("body[data-ready]")
+            measure(bench, picture, size)
+            browser.close()
+
+
+if __name__ == "__main__":
+    main()
