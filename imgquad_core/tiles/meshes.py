@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.errors import TopologyError
+from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.mesher import MeshingOptions, mesh_boundaries
-from imgquad_core.model import VOID
+from imgquad_core.model import VOID, PointKind, QuadMesh
 
 from .grid import Box
 from .outlines import Outlines, graph_of
@@ -34,7 +35,14 @@ class Patch(NamedTuple):
     region: Ints
 
 
-def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: MeshingOptions) -> TileMesh:
+class Wished(NamedTuple):
+    """A mesh, and the shared chains whose edges it would have halved."""
+
+    mesh: TileMesh | None  #: None where faces cannot be filled without that
+    chains: Flags
+
+
+def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: MeshingOptions) -> Wished:
     """Mesh the faces of a tile.
 
     Parameters
@@ -47,24 +55,28 @@ def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: Meshing
         Of the picture.
     options : MeshingOptions
         How faces are filled.
-
-    Raises
-    ------
-    TopologyError
-        Faces cannot be filled without edges of other tiles being halved.
     """
     if len(outlines.region) == 0:
         none = np.empty(0, np.int64)
-        return TileMesh(np.empty((0, 2)), none.reshape(0, 4), none, np.empty(0, bool))
+        return Wished(TileMesh(np.empty((0, 2)), none.reshape(0, 4), none, np.empty(0, bool)), outlines.shared)
     try:
         mesh = mesh_boundaries(graph_of(outlines, window, n_rows), options)
-    except TopologyError as error:
-        raise TopologyError(f"{error}, in the window {window} of a tile") from error
+    except TopologyError:
+        return Wished(None, outlines.shared)
     seam = np.zeros(mesh.n_points, bool)
     for c in np.flatnonzero(outlines.seam):
         seam[mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]] = True
     shift = np.array([window[0], n_rows - window[3]], float)
-    return TileMesh(mesh.points + shift, mesh.quads, outlines.region[mesh.quad_region], seam)
+    made = TileMesh(mesh.points + shift, mesh.quads, outlines.region[mesh.quad_region], seam)
+    return Wished(made, _wished(mesh, options.tuning.worst))
+
+
+def _wished(mesh: QuadMesh, worst: float) -> Flags:
+    """Tell the held chains with a quad that is worse than that beside them."""
+    poor = np.zeros(mesh.n_points, bool)
+    poor[mesh.quads[scaled_jacobian(mesh.points, mesh.quads) <= worst]] = True
+    poor &= mesh.point_kind == PointKind.HELD
+    return np.asarray(np.logical_or.reduceat(poor[mesh.chain_points], mesh.chain_offsets[:-1]))
 
 
 def patched(mesh: TileMesh, patches: list[Patch]) -> TileMesh:

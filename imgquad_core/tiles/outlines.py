@@ -10,7 +10,7 @@ the same in every window. Junctions where faces of several tiles meet are never 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -141,7 +141,9 @@ def _compressed(graph: BoundaryGraph, kept: Ints) -> tuple[Ints, Ints, Ints]:
     return offsets, ids.ravel().astype(np.int64), old
 
 
-def settled(t: int, mine: Outlines, others: Callable[[int], Outlines]) -> Outlines:
+def settled(
+    t: int, mine: Outlines, others: Callable[[int], Outlines], halved: Collection[tuple[int, ...]] = ()
+) -> Outlines:
     """Return a tile's outlines with the nodes that other tiles own copied from them, and shared ones held.
 
     Parameters
@@ -152,6 +154,8 @@ def settled(t: int, mine: Outlines, others: Callable[[int], Outlines]) -> Outlin
         As it computed them.
     others : callable
         Returns the outlines of another tile.
+    halved : collection of tuple
+        Keys of shared chains that get a mid-point on every edge: on both sides alike.
 
     Raises
     ------
@@ -173,6 +177,8 @@ def settled(t: int, mine: Outlines, others: Callable[[int], Outlines]) -> Outlin
                 inner, inner_kind = points[ids], kind[ids]
             else:
                 inner, inner_kind = known[int(mine.owner[c])].chains[tuple(mine.key[c].tolist())]
+            if tuple(mine.key[c].tolist()) in halved:
+                inner, inner_kind = _halved(inner, inner_kind)
             loop = mine.closed[c]
             inner, inner_kind = (inner[:-1], inner_kind[:-1]) if loop else (inner[1:-1], inner_kind[1:-1])
             new = n + np.arange(len(inner))
@@ -188,6 +194,13 @@ def settled(t: int, mine: Outlines, others: Callable[[int], Outlines]) -> Outlin
         ids=np.concatenate(new_ids),
         offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
     )
+
+
+def _halved(points: Floats, kind: Bytes) -> tuple[Floats, Bytes]:
+    """Return a chain with a mid-point on every edge."""
+    more, of = np.empty((2 * len(points) - 1, 2)), np.full(2 * len(points) - 1, PointKind.HELD, np.uint8)
+    more[::2], more[1::2], of[::2] = points, 0.5 * (points[:-1] + points[1:]), kind
+    return more, of
 
 
 class _Index(NamedTuple):

@@ -6,7 +6,7 @@
     labels     tile          materials without noise
     regions    tile          its regions, and once more: those of the picture, whole or cut
     outlines   tile          smoothed chains around its faces
-    mesh       tile          quads
+    mesh       tile          quads; again where shared edges are to be halved
     band       2, 4 tiles    clean-up across seams, in three rounds
     finish     tile          all patches in, its share of the report
     number     tile          which nodes are its own
@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints, Labels
+from imgquad_core.errors import TopologyError
 from imgquad_core.measures.quality import quad_areas, scaled_jacobian
 from imgquad_core.model import VOID
 from imgquad_core.options import MeshOptions
@@ -52,6 +53,7 @@ from .sources import Source, sample_boxes
 
 NOISE_REACH = 64  #: px around a tile that noise removal sees, beside the shortest length that stays
 CORNER_REACH = 5  #: data points around a tile that tell what is joined over corners
+ATTEMPTS = 3  #: at a tile: the later ones only where edges that it shares are to be halved
 BINS = 1000  #: of scaled Jacobians from 0 to 1
 
 
@@ -242,15 +244,40 @@ def _outlines_of(job: Job, t: int) -> Outlines:
     return Outlines(**load_arrays(job.path("outlines", t)))
 
 
-def mesh(job: Job, t: int, *_: Any) -> None:
-    """Mesh the faces of a tile."""
-    path = job.path("mesh", t)
+def mesh(job: Job, t: int, attempt: int, *_: Any) -> None:
+    """Mesh the faces of a tile, with the shared chains halved that it or a neighbour has wished for before.
+
+    Raises
+    ------
+    TopologyError
+        In the last attempt, faces cannot be filled.
+    """
+    path = job.path("wish", t, attempt)
     if path.exists():
         return
+    mine = _outlines_of(job, t)
+    asked = [_halved_before(job, t, mine, k) for k in (attempt - 1, attempt)]
+    if attempt > 0 and asked[0] == asked[1]:
+        save_arrays(path, chains=np.empty((0, 4), np.int64), made=load_arrays(job.path("wish", t, attempt - 1))["made"])
+        return
     rules, grid = job.rules(), job.grid
-    found = settled(t, _outlines_of(job, t), lambda other: _outlines_of(job, other))
+    found = settled(t, mine, lambda other: _outlines_of(job, other), asked[1])
     made = mesh_outlines(found, grid.window(t), grid.shape[0], rules.options.meshing(rules.legend.materials))
-    save_arrays(path, **made._asdict())
+    if made.mesh is not None:
+        save_arrays(job.path("mesh", t, attempt), **made.mesh._asdict())
+    elif attempt == ATTEMPTS - 1 or not mine.shared.any():
+        raise TopologyError(f"tile {grid.place(t)} cannot be filled between its neighbours")
+    save_arrays(path, chains=mine.key[made.chains & mine.shared], made=attempt)
+
+
+def _halved_before(job: Job, t: int, mine: Outlines, attempt: int) -> set[tuple[int, ...]]:
+    """Return the shared chains of a tile that were wished to be halved before an attempt."""
+    keys = {tuple(key) for key in mine.key[mine.shared].tolist()}
+    found: set[tuple[int, ...]] = set()
+    for other in job.grid.around(t):
+        for k in range(attempt):
+            found |= {tuple(key) for key in load_arrays(job.path("wish", other, k))["chains"].tolist()} & keys
+    return found
 
 
 def band(job: Job, kind: str, group: tuple[int, ...], *_: Any) -> None:
@@ -277,7 +304,8 @@ def bands_of(grid: Grid, t: int, rounds: int) -> list[tuple[str, tuple[int, ...]
 
 def _state(job: Job, t: int, rounds: int) -> TileMesh:
     """Return the mesh of a tile after some rounds of bands."""
-    found = TileMesh(**load_arrays(job.path("mesh", t)))
+    made = int(load_arrays(job.path("wish", t, ATTEMPTS - 1))["made"])
+    found = TileMesh(**load_arrays(job.path("mesh", t, made)))
     for kind in ROUNDS[:rounds]:
         patches = []
         for group in (group for each, group in bands_of(job.grid, t, rounds) if each == kind):

@@ -261,11 +261,15 @@ def _steps(job: Job, stored: Any, form: str) -> Iterator[Step]:
     for t in every:
         yield Step(f"outlines-{t}", _told(work.outlines), (job, t, Result("join")))
     for t in every:
-        yield Step(f"mesh-{t}", _told(work.mesh), (job, t, after("outlines", grid.around(t))))
+        yield Step(f"mesh-{t}-0", _told(work.mesh), (job, t, 0, after("outlines", grid.around(t))))
+    for k in range(1, work.ATTEMPTS):
+        for t in every:
+            needs = [Result(f"mesh-{other}-{k - 1}") for other in grid.around(t)]
+            yield Step(f"mesh-{t}-{k}", _told(work.mesh), (job, t, k, needs))
     yield from _band_steps(job)
     for t in every:
         bands = [Result(_band_key(*band)) for band in work.bands_of(grid, t, len(ROUNDS))]
-        yield Step(f"finish-{t}", _told(work.finish), (job, t, [Result(f"mesh-{t}"), *bands]))
+        yield Step(f"finish-{t}", _told(work.finish), (job, t, [Result(_meshed_key(t)), *bands]))
     for t in every:
         yield Step(f"number-{t}", _told(work.number), (job, t, after("finish", grid.around(t))))
     for t in every:
@@ -276,12 +280,16 @@ def _band_steps(job: Job) -> Iterator[Step]:
     for k, kind in enumerate(ROUNDS):
         for group in groups_of(job.grid, kind):
             before = dict.fromkeys(_band_key(*band) for t in group for band in work.bands_of(job.grid, t, k))
-            needs = [Result(key) for key in (*(f"mesh-{t}" for t in group), *before)]
+            needs = [Result(key) for key in (*map(_meshed_key, group), *before)]
             yield Step(_band_key(kind, group), _told(work.band), (job, kind, group, needs))
 
 
 def _band_key(kind: str, group: tuple[int, ...]) -> str:
     return "-".join(["band", kind, *map(str, group)])
+
+
+def _meshed_key(t: int) -> str:
+    return f"mesh-{t}-{work.ATTEMPTS - 1}"
 
 
 def _look(job: Job, _stored: Any) -> int:
