@@ -21,7 +21,7 @@ import zarr
 if __name__ == "__main__":
     picture = np.arange(64 * 64, dtype=np.uint16).reshape(64, 64)
     tifffile.imwrite("a.tif", picture, tile=(16, 16))
-    zarr.save_array("a.zarr", picture, chunks=(16, 16))
+    zarr.create_array("a.zarr", shape=(64, 64), chunks=(16, 16), dtype="uint16")[:] = picture
     pickle.dumps(zarr.open("a.zarr", mode="r"))
     print("zarr's own store: pickles")
     array = da.from_zarr(zarr.open(tifffile.imread("a.tif", aszarr=True), mode="r"))

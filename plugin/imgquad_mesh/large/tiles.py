@@ -251,29 +251,29 @@ def _steps(job: Job, stored: Any, form: str) -> Iterator[Step]:
 
     yield Step("look", _look, (job, stored))
     for t in every:
-        yield Step(f"tally-{t}", _told(work.tally), (job, t, Result("look")))
+        yield Step(f"tally-{t}", Guarded(work.tally), (job, t, Result("look")))
     yield Step("rules", work.decide, (job, Result("look"), after("tally", every)))
     for t in every:
-        yield Step(f"labels-{t}", _told(work.labels), (job, t, Result("rules")))
+        yield Step(f"labels-{t}", Guarded(work.labels), (job, t, Result("rules")))
     for t in every:
-        yield Step(f"regions-{t}", _told(work.regions), (job, t, after("labels", grid.around(t))))
+        yield Step(f"regions-{t}", Guarded(work.regions), (job, t, after("labels", grid.around(t))))
     yield Step("join", work.join, (job, after("regions", every)))
     for t in every:
-        yield Step(f"outlines-{t}", _told(work.outlines), (job, t, Result("join")))
+        yield Step(f"outlines-{t}", Guarded(work.outlines), (job, t, Result("join")))
     for t in every:
-        yield Step(f"mesh-{t}-0", _told(work.mesh), (job, t, 0, after("outlines", grid.around(t))))
+        yield Step(f"mesh-{t}-0", Guarded(work.mesh), (job, t, 0, after("outlines", grid.around(t))))
     for k in range(1, work.ATTEMPTS):
         for t in every:
             needs = [Result(f"mesh-{other}-{k - 1}") for other in grid.around(t)]
-            yield Step(f"mesh-{t}-{k}", _told(work.mesh), (job, t, k, needs))
+            yield Step(f"mesh-{t}-{k}", Guarded(work.mesh), (job, t, k, needs))
     yield from _band_steps(job)
     for t in every:
         bands = [Result(_band_key(*band)) for band in work.bands_of(grid, t, len(ROUNDS))]
-        yield Step(f"finish-{t}", _told(work.finish), (job, t, [Result(_meshed_key(t)), *bands]))
+        yield Step(f"finish-{t}", Guarded(work.finish), (job, t, [Result(_meshed_key(t)), *bands]))
     for t in every:
-        yield Step(f"number-{t}", _told(work.number), (job, t, after("finish", grid.around(t))))
+        yield Step(f"number-{t}", Guarded(work.number), (job, t, after("finish", grid.around(t))))
     for t in every:
-        yield Step(f"piece-{t}", _told(write_piece), (job, t, after("number", every), form))
+        yield Step(f"piece-{t}", Guarded(write_piece), (job, t, after("number", every), form))
 
 
 def _band_steps(job: Job) -> Iterator[Step]:
@@ -281,7 +281,7 @@ def _band_steps(job: Job) -> Iterator[Step]:
         for group in groups_of(job.grid, kind):
             before = dict.fromkeys(_band_key(*band) for t in group for band in work.bands_of(job.grid, t, k))
             needs = [Result(key) for key in (*map(_meshed_key, group), *before)]
-            yield Step(_band_key(kind, group), _told(work.band), (job, kind, group, needs))
+            yield Step(_band_key(kind, group), Guarded(work.band), (job, kind, group, needs))
 
 
 def _band_key(kind: str, group: tuple[int, ...]) -> str:
@@ -296,7 +296,7 @@ def _look(job: Job, _stored: Any) -> int:
     return work.look(job)
 
 
-class _told:
+class Guarded:
     """A step of a tile that says which one it was where memory does not do for it. Pickled by what it calls."""
 
     def __init__(self, call: Any) -> None:
