@@ -48,6 +48,7 @@ COLLAPSE = 6  # the first of the two cavities in which the quad is collapsed
 CAVITIES = COLLAPSE + 2  # that are tried around a quad, see `_grow`
 FILLINGS = 3  # of an outline: without a new node, or a star on its even or on its odd nodes
 CENTRE_STEPS = 8  # of the pattern search for the best place of a new node; it narrows to 0.6 where none is better
+ROUNDING = 1e-12  # of a sine
 
 
 class Tables(NamedTuple):
@@ -145,7 +146,7 @@ def _worst_drawn(canvas: Canvas, floor: float) -> float:
 
 
 @inlined
-def _draw_star(canvas: Canvas, loop: Ints, n: int, turn: int) -> float:
+def _draw_star(canvas: Canvas, loop: Ints, n: int, turn: int, floor: float) -> float:
     """Draw a star whose centre is joined to the nodes turn, turn + 2, ...; return its worst quality."""
     canvas.tally[POINTS], canvas.tally[QUADS] = 1, n // 2
     o = canvas.first
@@ -161,13 +162,40 @@ def _draw_star(canvas: Canvas, loop: Ints, n: int, turn: int) -> float:
         reach = max(
             reach, np.hypot(canvas.points[v, 0] - canvas.points[o, 0], canvas.points[v, 1] - canvas.points[o, 1])
         )
-    return _centred(canvas, reach)
+    return _centred(canvas, reach, floor)
 
 
 @verb
-def _centred(canvas: Canvas, reach: float) -> float:
-    """Move the drawn point to where the worst quality is best; return that."""
+def _corner_sine(canvas: Canvas, q: int, k: int) -> float:
+    p, n, b = canvas.quads[q, k], canvas.quads[q, (k + 1) & 3], canvas.quads[q, (k + 3) & 3]
+    ax, ay = canvas.points[n, 0] - canvas.points[p, 0], canvas.points[n, 1] - canvas.points[p, 1]
+    bx, by = canvas.points[b, 0] - canvas.points[p, 0], canvas.points[b, 1] - canvas.points[p, 1]
+    return float((ax * by - ay * bx) / (np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by)) + 1e-300))
+
+
+@verb
+def _fixed_quality(canvas: Canvas) -> float:
+    """Return the least sine of the corners that do not hang on the drawn point: no place of it makes the worst better.
+
+    A quad has three corners that do, or none.
+    """
+    o, worst = canvas.first, 1.0
+    for q in range(canvas.tally[QUADS]):
+        away = True
+        for k in range(4):
+            away &= canvas.quads[q, k] != o
+        for k in range(4):
+            if away or canvas.quads[q, (k + 2) & 3] == o:
+                worst = min(worst, _corner_sine(canvas, q, k))
+    return worst
+
+
+@verb
+def _centred(canvas: Canvas, reach: float, floor: float) -> float:
+    """Move the drawn point to where the worst quality is best; return that, or one that is not above `floor`."""
     o = canvas.first
+    if _fixed_quality(canvas) < floor - ROUNDING:
+        return -1.0
     best, step = _worst_drawn(canvas, -1.0), 0.3 * reach
     for _ in range(CENTRE_STEPS):
         x, y = canvas.points[o, 0], canvas.points[o, 1]
@@ -215,7 +243,7 @@ def _worst_member(net: Net, cavity: Cavity) -> float:
 
 
 @inlined
-def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) -> float:
+def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int, floor: float) -> float:
     """Draw the cavity with corners k and k + 2 of quad q made one node; return its worst quality."""
     a, c = net.quads[q, k], net.quads[q, k + 2]
     if net.rim[a] and net.rim[c]:
@@ -237,7 +265,7 @@ def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int) ->
             canvas.quads[canvas.tally[QUADS], j] = v
         canvas.tally[QUADS] += 1
     reach = np.hypot(net.points[a, 0] - net.points[c, 0], net.points[a, 1] - net.points[c, 1])
-    return _centred(canvas, reach) if merged == o else _worst_drawn(canvas, -1.0)
+    return _centred(canvas, reach, floor) if merged == o else _worst_drawn(canvas, -1.0)
 
 
 @verb
@@ -248,9 +276,9 @@ def _draw(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, choi
     """
     n = cavity.tally[OUTLINE]
     if choice.cavity >= COLLAPSE:
-        return _draw_collapsed(net, cavity, canvas, q, choice.cavity - COLLAPSE) if choice.filling == 0 else -1.0
+        return _draw_collapsed(net, cavity, canvas, q, choice.cavity - COLLAPSE, floor) if choice.filling == 0 else -1.0
     if choice.filling > 0:
-        return _draw_star(canvas, cavity.loop, n, choice.filling - 1)
+        return _draw_star(canvas, cavity.loop, n, choice.filling - 1, floor)
     worst = _best_fill(net.points, cavity.loop, n, floor, tables)
     if worst > floor:
         _draw_fill(canvas, cavity.loop, n, tables)

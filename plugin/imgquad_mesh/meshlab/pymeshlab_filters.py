@@ -50,28 +50,16 @@ class MissingMeshLab(InputError):
 
 
 @cache
-def start_asking() -> subprocess.Popen[str]:
-    """Start the process that is asked, to work on something else meanwhile."""
+def answer() -> str:
+    """Return what pymeshlab prints of its filters and their parameters."""
     if pymeshlab_folder() is None:
         raise MissingMeshLab("pymeshlab is not installed; pip install 'imgquad-mesh[meshlab]'")
-    pipe = subprocess.PIPE
-    return subprocess.Popen([sys.executable, "-c", _ASK], stdout=pipe, stderr=pipe, text=True, errors="replace")
-
-
-@cache
-def _answer() -> str:
-    process = start_asking()
-    try:
-        printed, messages = process.communicate(timeout=120)
-    except BaseException:  # an interrupt, too, must not leave it behind
-        process.kill()
-        raise
-    finally:
-        start_asking.cache_clear()
-    if process.returncode:
-        reason = (messages.strip().splitlines() or [f"exit code {process.returncode}"])[-1]
+    command = [sys.executable, "-c", _ASK]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, errors="replace", check=False)
+    if done.returncode:
+        reason = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
         raise MissingMeshLab(f"pymeshlab cannot be imported ({reason}); {_PACKAGES}")
-    return printed
+    return done.stdout
 
 
 @cache
@@ -83,7 +71,7 @@ def meshlab_filters() -> tuple[str, ...]:
     MissingMeshLab
         When pymeshlab is missing, cannot be imported, or could load only a part of its plugins.
     """
-    found = re.search(r"^FILTERS (.*)$", _answer(), re.MULTILINE)
+    found = re.search(r"^FILTERS (.*)$", answer(), re.MULTILINE)
     names: tuple[str, ...] = tuple(json.loads(found[1])) if found else ()
     if _LOADED_WHOLE not in names:
         raise MissingMeshLab(
@@ -97,7 +85,7 @@ def meshlab_parameters(functions: frozenset[str]) -> dict[str, dict[str, str]]:
     """Return the parameters of some filters: for each filter, Python name -> type as pymeshlab prints it."""
     parameters: dict[str, dict[str, str]] = {name: {} for name in functions}
     current: dict[str, str] = {}
-    for line in _answer().splitlines():
+    for line in answer().splitlines():
         header = re.fullmatch(r"(\w+) filter - list of parameter names:", line)
         if header:
             current = parameters.get(header[1], {})

@@ -269,10 +269,11 @@ def test_missing_picture_is_named(tmp_path: Path) -> None:
 
 @pytest.fixture
 def asked_anew() -> Any:
-    for function in (pymeshlab_filters.meshlab_filters, pymeshlab_filters.meshlab_parameters):
+    asked = (pymeshlab_filters.answer, pymeshlab_filters.meshlab_filters, pymeshlab_filters.meshlab_parameters)
+    for function in asked:
         function.cache_clear()
     yield
-    for function in (pymeshlab_filters.meshlab_filters, pymeshlab_filters.meshlab_parameters):
+    for function in asked:
         function.cache_clear()
 
 
