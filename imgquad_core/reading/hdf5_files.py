@@ -16,6 +16,7 @@ from .calibration import Calibration, PixelSize, size_of
 from .crystal_map import CrystalMap, Phase, crystal_picture, crystals_of, grain_names
 from .decoding import Stack, assert_pixels, decoding, optional
 from .grains import LAUE_GROUPS, quaternions_of
+from .hdf5_texts import texts_of
 from .numpy_files import chosen_array
 from .options import ReadOptions
 from .packed import DEFLATE, assert_unpacks
@@ -61,7 +62,7 @@ def _oina_map(path: Path, group: Any, options: ReadOptions) -> CrystalMap:
     phase = np.nan_to_num(np.asarray(data["Phase"], float).reshape(n_rows, n_cols)).astype(np.int32)
     euler = np.asarray(data["Euler"], float).reshape(n_rows, n_cols, 3)
     lost = (phase <= 0) | ~np.isfinite(euler).all(axis=2)
-    phases = {int(number): _oina_phase(found) for number, found in header["Phases"].items()}
+    phases = {int(number): _oina_phase(path, found) for number, found in header["Phases"].items()}
     unknown = np.setdiff1d(phase[~lost], list(phases))
     if len(unknown):
         raise InputError(f"{path} holds phase {unknown[0]}, its header names {sorted(phases)}: export it anew")
@@ -69,18 +70,15 @@ def _oina_map(path: Path, group: Any, options: ReadOptions) -> CrystalMap:
     return CrystalMap(np.where(lost, -1, phase).astype(np.int32), np.nan_to_num(euler), phases, size)
 
 
-def _oina_phase(group: Any) -> Phase:
+def _oina_phase(path: Path, group: Any) -> Phase:
     laue = int(_scalar(group["Laue Group"]))
-    return Phase(_text(group["Phase Name"]), LAUE_GROUPS[laue - 1] if 1 <= laue <= len(LAUE_GROUPS) else "-1")
+    return Phase(
+        texts_of(path, group["Phase Name"])[0], LAUE_GROUPS[laue - 1] if 1 <= laue <= len(LAUE_GROUPS) else "-1"
+    )
 
 
 def _scalar(dataset: Any) -> Any:
     return np.ravel(dataset[()])[0]
-
-
-def _text(dataset: Any) -> str:
-    value = _scalar(dataset)
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 # -------------------------------------------------------------------------------------------------- arrays
@@ -187,7 +185,7 @@ def _with_crystals(picture: Picture, path: Path, dataset: Any, options: ReadOpti
     euler, phase = (_plane_like(path, group[name], options) for name in ("EulerAngles", "Phases"))
     if euler.shape != (*grains.shape, 3):
         return picture
-    crystals = crystals_of(grains, phase.astype(np.int32), quaternions_of(euler), _phases(group.parent))
+    crystals = crystals_of(grains, phase.astype(np.int32), quaternions_of(euler), _phases(path, group.parent))
     return replace(picture, crystals=crystals, names=grain_names(crystals))
 
 
@@ -197,13 +195,12 @@ def _plane_like(path: Path, dataset: Any, options: ReadOptions) -> NDArray[Any]:
     return np.asarray(plane if plane.ndim == 3 and plane.shape[2] > 1 else plane.reshape(plane.shape[:2]))
 
 
-def _phases(container: Any) -> dict[int, Phase]:
+def _phases(path: Path, container: Any) -> dict[int, Phase]:
     """Return the phases of the ensemble data beside the cells; number 0 stands for none."""
     for group in container.values():
         if hasattr(group, "get") and "CrystalStructures" in group:
             codes = np.ravel(group["CrystalStructures"][()]).tolist()
-            names = np.ravel(group["PhaseName"][()]).tolist() if "PhaseName" in group else []
-            texts = [name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name) for name in names]
+            texts = texts_of(path, group["PhaseName"]) if "PhaseName" in group else []
             return {
                 k: Phase(texts[k] if k < len(texts) else f"phase {k}", _LAUE.get(int(code), "-1"))
                 for k, code in enumerate(codes)

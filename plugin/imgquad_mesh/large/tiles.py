@@ -303,6 +303,7 @@ class Guarded:
         self.call = call
 
     def __call__(self, job: Job, *args: Any) -> Any:
+        """Do the step."""
         try:
             return self.call(job, *args)
         except MemoryError as error:

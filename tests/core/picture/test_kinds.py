@@ -138,8 +138,8 @@ def test_letters_have_the_colours_they_were_drawn_in_and_cracks_keep_their_label
         draw.text((10, 70 + 12 * k), f"EHT = {k}.00 kV  WD = 3.9 mm  Mag = 50.00 K X", fill=252)
     letters = np.asarray(page)
     if len(np.unique(letters)) > 8:  # Pillow with FreeType draws blends
-        assert segment(letters).materials.labels.tolist() == [0, 252]
+        assert segment_picture(letters).image.materials.labels.tolist() == [0, 252]
     cracks = np.zeros((200, 200), np.uint16)
     for k in range(40):
         cracks[5 * k, 3 * k % 60 : 3 * k % 60 + 90] = k + 1
-    assert len(segment(cracks).materials.labels) == 41
+    assert len(segment_picture(cracks).image.materials.labels) == 41

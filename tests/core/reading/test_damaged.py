@@ -10,8 +10,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from imgquad_core.errors import InputError
+from imgquad_core.reading.formats import read_picture
 from imgquad_mesh.datasets.pictures import read_any
-from support.files import WRITERS, assert_read_or_refused, damage, options_for
+from support.files import WRITERS, assert_read_or_refused, damage, options_for, write_dream3d
 
 CUTS = (1, 4, 20, 100, 200, 348, 400, -40, -1)
 
@@ -47,3 +49,15 @@ def test_a_file_of_changed_bytes(written: dict[str, Path], tmp_path: Path, name:
     (shutil.copytree if written[name].is_dir() else shutil.copyfile)(written[name], target)
     damage(target, np.random.default_rng(seed))
     assert_read_or_refused(target)
+
+
+def test_texts_of_hdf5_whose_heap_is_damaged_are_refused(tmp_path: Path) -> None:
+    """The length of the last text made larger: the walk would end at zeros, which HDF5 1.14 walks for ever."""
+    path = write_dream3d(tmp_path / "a.dream3d")
+    content = bytearray(path.read_bytes())
+    heap = content.index(b"GCOL")
+    last = content.index(b"Nickel", heap) - 8
+    content[last : last + 8] = (184).to_bytes(8, "little")
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"a\.dream3d is damaged where the texts of .*PhaseName lie"):
+        read_picture(path)
