@@ -52,7 +52,7 @@ def test_a_file_of_changed_bytes(written: dict[str, Path], tmp_path: Path, name:
 
 
 def test_texts_of_hdf5_whose_heap_is_damaged_are_refused(tmp_path: Path) -> None:
-    """The length of the last text made larger: the walk would end at zeros, which HDF5 1.14 walks for ever."""
+    """The length of the last text made larger: the walk would end at zeros, which HDF5 2.0 walks for ever."""
     path = write_dream3d(tmp_path / "a.dream3d")
     content = bytearray(path.read_bytes())
     heap = content.index(b"GCOL")
