@@ -20,6 +20,10 @@ from pathlib import Path
 import numpy as np
 
 PAGE = Path(__file__).parents[1] / "docs" / "fe" / "tools.md"
+HEADS = (
+    ("program", "version", "file", "options", "materials", "borders", "result", "error"),
+    ("program", "8 nodes", "9 nodes"),
+)
 BEGIN, END = "<!-- made by benchmarks/downstream.py -->", "<!-- end -->"
 WORK = Path("/tmp/imgquad-downstream")
 #: built by hand from its source: it is in neither Debian nor PyPI
@@ -139,32 +143,39 @@ RUNS = (
 
 
 def main() -> None:
-    """Print the rows of the programs asked for; of all, put them into docs/fe/tools.md."""
-    asked = set(sys.argv[1:])
+    """Run the programs asked for (all without names), print their rows and put them into docs/fe/tools.md."""
     WORK.mkdir(exist_ok=True)
-    heads = ("program", "version", "file", "options", "materials", "borders", "result", "error")
-    lines = [f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}"]
-    took: dict[str, dict[str, str]] = {}
-    for run in RUNS:
-        if not asked or run.program in asked:
-            cells = row(run)
-            lines.append(f"| {' | '.join(cells)} |")
-            print(lines[-1], flush=True)
-            note_order(took.setdefault(run.program, {}), run, cells)
-    lines.append("\nOrder 2:\n\n| program | 8 nodes | 9 nodes |\n|---|---|---|")
-    lines += [f"| {program} | {got.get('8', 'no file')} | {got.get('9', 'no file')} |" for program, got in took.items()]
-    print(lines[-len(took) - 1], *lines[-len(took) :], sep="\n")
-    if not asked:
-        before, mark, rest = PAGE.read_text(encoding="utf-8").partition(f"{BEGIN}\n")
-        after = rest.partition(END)[2]
-        PAGE.write_text("\n".join([f"{before}{mark}", *lines, "", f"{END}{after}"]), encoding="utf-8")
+    asked = sys.argv[1:] or list(dict.fromkeys(run.program for run in RUNS))
+    for program in asked:
+        mine = [run for run in RUNS if run.program == program]
+        cells = [row(run) for run in mine]
+        rows = [f"| {' | '.join(line)} |" for line in cells]
+        print(*rows, sep="\n", flush=True)
+        put(rows, [f"| {program} | {took(mine, cells, EIGHT)} | {took(mine, cells, NINE)} |"])
 
 
-def note_order(answers: dict[str, str], run: Run, cells: list[str]) -> None:
-    """Note what became of a file of order 2."""
-    if "--order" in run.options:
-        result, error = cells[-2:]
-        answers["9" if "9" in run.options else "8"] = f"yes, {error}" if error else result
+def took(runs: list[Run], cells: list[list[str]], order: tuple[str, ...]) -> str:
+    """Return what became of a file of second order."""
+    for run, (*_, result, error) in zip(runs, cells, strict=True):
+        if ("--order" in run.options, "9" in run.options) == (True, order == NINE):
+            return f"yes, {error}" if error else result
+    return "no file"
+
+
+def put(*tables: list[str]) -> None:
+    """Put rows into the tables of the page: a program's rows replace those that it had there."""
+    before, mark, rest = PAGE.read_text(encoding="utf-8").partition(f"{BEGIN}\n")
+    block, end, after = rest.partition(END)
+    old = block.partition("Order 2:")[::2]
+    order = list(dict.fromkeys(run.program for run in RUNS))
+    parts = []
+    for head, rows, shown in zip(HEADS, tables, old, strict=True):
+        names = {line.split(" | ")[0] for line in rows}
+        kept = [line for line in shown.splitlines() if line.startswith("|") and line.split(" | ")[0] not in names]
+        known = [line for line in kept if line.split(" | ")[0].strip("| ") in order]
+        told = sorted(known + rows, key=lambda line: order.index(line.split(" | ")[0].strip("| ")))
+        parts.append("\n".join([f"| {' | '.join(head)} |\n|{'---|' * len(head)}", *told]))
+    PAGE.write_text(f"{before}{mark}\n{parts[0]}\n\nOrder 2:\n\n{parts[1]}\n\n{end}{after}", encoding="utf-8")
 
 
 def row(run: Run) -> list[str]:

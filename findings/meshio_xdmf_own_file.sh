@@ -19,8 +19,8 @@ for cells in (CELLS[1:], CELLS):
     try:
         told = [block.type for block in meshio.read("a.xdmf").cells]
     except KeyError as error:
-        told = repr(error)
+        told = type(error).__name__
     print([kind for kind, _ in cells], "->", told)
-    assert told == ("KeyError(0)" if len(cells) == 3 else ["line", "quad"]), "changed"
+    assert told == ("KeyError" if len(cells) == 3 else ["line", "quad"]), "changed"
 P
 echo "still so: KeyError"
