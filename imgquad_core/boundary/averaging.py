@@ -41,11 +41,12 @@ _SHORTEST_LOOP = 14  # closed chains of fewer points stay as they are
 _ENDS = 3.0  # deviations to either side
 _EVERY = 0.75  # of the width, from sample to sample along the stairs
 _NARROWEST = 1.0  # data points; places that need less keep their pixels
-_OF_FREE = 0.5  # width over the distance to foreign parts, at most
+_OF_FREE = 0.75  # width over the distance to foreign parts, at most
 _OF_REGION = 0.5  # and over the root of the area of regions beside it
 _WIDENS = 0.5  # of the width, a unit of length along the chain
 _ROOM = 0.49  # of the distance to foreign parts: two points that both go that far do not meet
 _ARC_RATIO = 2.0  # arc over distance of a foreign point
+_THIN = 3.0  # the same where a narrower bell is needed: chains that meet at more than 39 degrees are not thin
 _ROUNDS = 12  # of halving widths; afterwards whole chains keep their pixels
 
 
@@ -67,9 +68,9 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
         The same chains, coordinates and picture divided by `width`.
     """
     curves, ends = curves_of(*chains)
-    free = local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
-    room = _ROOM * free
-    scale = _graded(curves, np.minimum(_widest(chains.graph, curves, width), _OF_FREE * free))
+    room = _ROOM * local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
+    thin = local_feature_size(curves.raw, curves, _REACH * width, _THIN)
+    scale = _graded(curves, np.minimum(_widest(chains.graph, curves, width), _OF_FREE * thin))
     new = np.ones(len(curves.ends), bool)
     for attempt in range(_ROUNDS + 2):
         at, offsets = _places(curves, scale)
