@@ -18,7 +18,11 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser("studio", help="mesh pictures on a page in the browser", description=text)
     add = parser.add_argument
     add("picture", type=Path, metavar="PICTURE", nargs="?", help="a picture to begin with")
-    add("--host", default="127.0.0.1", help="address to serve on; another than 127.0.0.1 is open to the network")
+    add(
+        "--host",
+        default="127.0.0.1",
+        help="address to serve on, as others call it (default: 127.0.0.1, yours only)",
+    )
     add("--port", type=whole, default=0, metavar="N", help="0: a free one (default)")
     add("--no-browser", action="store_true", help="print the address only")
     add("--megabytes", type=whole, default=64, metavar="N", help="largest upload (default: 64)")
@@ -39,6 +43,8 @@ def execute(args: argparse.Namespace) -> int:
         raise InputError(f"the studio needs {error.name}: pip install 'imgquad-mesh[studio]'") from error
     if args.picture is not None and not args.picture.is_file():
         raise InputError(f"there is no picture {args.picture}; give the path of a file")
+    if args.host in ("0.0.0.0", "::", ""):
+        raise InputError(f"host is '{args.host}', which is any; give the address by which others reach this machine")
     limits = Limits(
         bytes=args.megabytes * 1_000_000,
         pixels=int(args.megapixels * 1e6),
@@ -47,7 +53,7 @@ def execute(args: argparse.Namespace) -> int:
     )
     with _listening(args.host, args.port) as listening:
         port = listening.getsockname()[1]
-        own = () if args.host in ("127.0.0.1", "0.0.0.0", "::") else (args.host,)
+        own = () if args.host == "127.0.0.1" else (args.host,)
         place = Place(port, (*own, "127.0.0.1", "localhost", "[::1]"))
         if args.host != "127.0.0.1":
             print(f"warning: whoever reaches {args.host} and has this address can use the studio, unencrypted")

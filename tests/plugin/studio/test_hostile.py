@@ -232,3 +232,21 @@ def test_what_the_fork_server_loads_can_be_imported() -> None:
 
     for name in PRELOAD:
         import_module(name)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--host", "0.0.0.0"], "give the address by which others reach"),
+        (["--host", "no.such.host.example"], "cannot listen on"),
+        (["--port", "99999999"], "cannot listen on"),
+        (["no_such_picture.png"], "there is no picture"),
+    ],
+)
+def test_a_studio_that_cannot_be_served_says_why(
+    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from imgquad_mesh.__main__ import main
+
+    assert main(["studio", "--no-browser", *options]) == 2
+    assert said in capsys.readouterr().err

@@ -15,9 +15,8 @@ from PIL import Image
 
 from imgquad_mesh.__main__ import main
 from support.ccx import needs_ccx, solve
-from support.studio import CHROMIUM, Studio
+from support.studio import Studio
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 STEPS = ("segment", "denoise", "smooth", "mesh", "mesh")
 
 

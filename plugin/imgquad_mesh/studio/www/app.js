@@ -31,6 +31,7 @@ async function open(blob, name) {
     restart();
     if (decoded) showPicture(decoded, [decoded.width, decoded.height]);
     at("drop").hidden = true;
+    at("bar").hidden = false;
     at("name").textContent = picture.name;
     go(0);
   } catch (error) {
