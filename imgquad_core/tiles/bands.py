@@ -90,11 +90,12 @@ def cleaned_band(
         Tells the places whose seams count.
     """
     whole, tile, place = joined_meshes(meshes)
-    several = np.bincount(_pairs(whole, tile), minlength=len(whole.points)) > 1
-    seam = whole.seam & several & is_place(whole.points)
+    shared = _in_several(whole.quads, np.repeat(tile[:, None], 4, axis=1), len(whole.points))
+    seam = whole.seam & shared & is_place(whole.points)
     if not seam.any():
         return [_nothing()] * len(group)
-    beside = np.isin(whole.region, np.unique(whole.region[seam[whole.quads].any(axis=1)]))
+    _, region = np.unique(whole.region, return_inverse=True)
+    beside = _in_several(region.ravel(), tile, int(region.max()) + 1)[region.ravel()]
     quads = np.flatnonzero(beside & nodes_around(whole.quads, seam, BAND - 1)[whole.quads].any(axis=1))
     points, corners, region = _cleaned(whole, quads, nodes_around(whole.quads, seam, SEEDS))
     centre = points[corners].mean(axis=1)
@@ -114,10 +115,10 @@ def _nothing() -> Patch:
     return Patch(none, np.empty((0, 2)), none.reshape(0, 4), none)
 
 
-def _pairs(whole: TileMesh, tile: Ints) -> Ints:
-    """Return the node of each pair of a node and a tile that has it."""
-    n = int(tile.max(initial=0)) + 1
-    return np.unique(whole.quads * n + tile[:, None]) // n
+def _in_several(what: Ints, tile: Ints, n: int) -> Flags:
+    """Tell which of n things occur in several tiles."""
+    n_tiles = int(tile.max(initial=0)) + 1
+    return np.bincount(np.unique(what * n_tiles + tile) // n_tiles, minlength=n) > 1
 
 
 def _cleaned(whole: TileMesh, quads: Ints, near: Flags) -> tuple[Floats, Ints, Ints]:
