@@ -35,8 +35,10 @@ def add_parser(subparsers: Any) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Mesh the picture that `args` names; return the exit code."""
     from imgquad_mesh.large import mesh_tiles
+    from imgquad_mesh.outputs.files import check_files
     from imgquad_mesh.progress import counting_if
 
+    check_files([args.image], [args.deck])
     kinds = ("labels", "outlines", "mesh", "band", "piece")
     with counting_if(not args.quiet, dict.fromkeys(kinds)) as told:
         made = mesh_tiles(
