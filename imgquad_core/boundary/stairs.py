@@ -126,7 +126,7 @@ def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
     is_closed = graph.chain_points[graph.chain_offsets[:-1]] == graph.chain_points[graph.chain_offsets[1:] - 1]
     is_closed &= chains.side[graph.chain_offsets[:-1]] != PIXEL_CORNER
     begin, end = runs.begin / size, runs.end / size
-    stays = _swallow(chains, runs, runs.length / number)
+    stays = _swallow(chains, runs, is_closed, runs.length / number)
     while True:  # chains with finer detail than a data point may cross where bends are cut: these keep their pixels
         sides = np.where(stays[runs.chain], np.rint(runs.length).astype(np.int64), number)
         raw, side, offsets = _draw(runs.chain, begin, end, runs.axis, sides, is_closed)
@@ -139,22 +139,31 @@ def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
         stays[bad] = True
 
 
-def _swallow(chains: PixelChains, runs: _Runs, side: Floats) -> Flags:
+def _swallow(chains: PixelChains, runs: _Runs, is_closed: Flags, side: Floats) -> Flags:
     """Tell which chains would leave out points of others where their bends are cut, between the middles of sides."""
     found = np.zeros(chains.graph.n_chains, bool)
-    bend = np.flatnonzero(runs.chain[1:] == runs.chain[:-1])
-    corner, legs = runs.end[bend], 0.5 * np.stack([side[bend], side[bend + 1]], axis=1)
+    before, after = _bends(runs.chain, is_closed)
+    corner, legs = runs.end[before], 0.5 * np.stack([side[before], side[after]], axis=1)
     is_cut = legs.max(axis=1) > 0.5
     if not is_cut.any() or (runs.length >= _SHORT * side.max()).all():
         return found  # no detail is finer than a data point
-    back, ahead = (_unit(runs, at) for at in (bend, bend + 1))
+    back, ahead = (_unit(runs, at) for at in (before, after))
     points = chains.graph.points
     tree = cKDTree(points)
     for k in np.flatnonzero(is_cut).tolist():
         near = points[tree.query_ball_point(corner[k], legs[k].max())] - corner[k]
         u, v = -(near * back[k]).sum(axis=1) / legs[k, 0], (near * ahead[k]).sum(axis=1) / legs[k, 1]
-        found[runs.chain[bend[k]]] |= bool(((u > 0) & (v > 0) & (u + v < 1)).any())
+        found[runs.chain[before[k]]] |= bool(((u > 0) & (v > 0) & (u + v < 1)).any())
     return found
+
+
+def _bends(chain: Ints, is_closed: Flags) -> tuple[Ints, Ints]:
+    """Return the runs before and after each bend; a closed chain has one where it begins, too."""
+    same = np.flatnonzero(chain[1:] == chain[:-1])
+    first = np.flatnonzero(np.diff(chain, prepend=-1))
+    last = np.append(first[1:], len(chain)) - 1
+    round_ = is_closed[chain[first]] & (last > first)
+    return np.concatenate([same, last[round_]]), np.concatenate([same + 1, first[round_]])
 
 
 def _unit(runs: _Runs, at: Ints) -> Floats:

@@ -126,6 +126,21 @@ def test_a_disc_of_wide_data_points_is_round() -> None:
     assert np.sqrt((off**2).mean()) < 0.12
 
 
+@pytest.mark.parametrize("turns", range(4))
+def test_no_bend_is_cut_beyond_what_lies_behind_it(turns: int) -> None:
+    labels = np.zeros((50, 50), np.int32)
+    labels[10:40, 10:40] = 1
+    labels[11, 11] = 2  # behind one corner; a closed chain begins at one of the four
+    chains = pixel_chains(extract_boundaries(label_image(np.rot90(labels, turns).copy())))
+    drawn = in_data_points(chains, (10.0, 10.0)).graph
+    block = np.flatnonzero(
+        (np.sort(chains.graph.region_label[chains.graph.chain_regions], axis=1) == (0, 1)).all(axis=1)
+    )
+    number = np.diff(drawn.chain_offsets)[block], np.diff(chains.graph.chain_offsets)[block]
+    assert len(block) == 1
+    assert np.array_equal(*number)  # it keeps its pixels
+
+
 def test_one_number_is_both_sides() -> None:
     assert as_step(3) == (3.0, 3.0)
     assert as_step((3, 2.5)) == (3.0, 2.5)
