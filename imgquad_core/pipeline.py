@@ -63,6 +63,7 @@ T = TypeVar("T")
 Progress: TypeAlias = Callable[[str, int, int], None]
 STAGES = ("read", "segment", "denoise", "absorb", "boundary", "smooth", "mesh")
 MOST_QUADS = 200_000_000  #: more are refused before memory is
+_MATCHES = 8  # rounds in which opposite sides of a periodic cell are cut alike
 MUCH, MATTERS = 0.5, 0.01  #: share of a material that is lost, and of the picture that it had, from which it is told
 _REMEDIES = "remove noise (min-pixels, min-length), ask for a smaller size or raise the tolerance"
 _FIRST_REMEDY = (
@@ -335,10 +336,12 @@ def fill_boundaries(
 ) -> tuple[BoundaryGraph, QuadMesh]:
     """Mesh; where the mesher has cut edges of one side of a periodic cell only, cut the other, too, and mesh anew."""
     mesh = mesh_boundaries(boundary, options, materials)
-    for _ in range(4 if periodic != "none" else 0):
+    for attempt in range(_MATCHES if periodic != "none" else 0):
         again = rematch(boundary, mesh, periodic)
         if again is None:
             break
+        if attempt >= _MATCHES // 2:  # only what must be cut is: wishes of both sides may go on and on
+            options = replace(options, tuning=options.tuning._replace(wishes=0))
         boundary, mesh = again, mesh_boundaries(again, options, materials)
     return boundary, mesh
 
