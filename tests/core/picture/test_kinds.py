@@ -131,11 +131,11 @@ def test_real_pictures_are_of_the_kind_that_their_catalogue_says(images: Path) -
 def test_letters_have_the_colours_they_were_drawn_in_and_cracks_keep_their_labels() -> None:
     from PIL import Image, ImageDraw
 
-    page = Image.new("L", (300, 200), 0)
+    page = Image.new("L", (600, 500), 0)
     draw = ImageDraw.Draw(page)
-    draw.rectangle((0, 0, 120, 60), fill=252)
-    for k in range(10):
-        draw.text((10, 70 + 12 * k), f"EHT = {k}.00 kV  WD = 3.9 mm  Mag = 50.00 K X", fill=252)
+    draw.rectangle((0, 0, 590, 400), fill=252)
+    for k in range(3):
+        draw.text((10, 440 + 14 * k), f"EHT = {k}.00 kV  WD = 3.9 mm  Mag = 50.00 K X  Signal A = InLens", fill=252)
     letters = np.asarray(page)
     if len(np.unique(letters)) > 8:  # Pillow with FreeType draws blends
         assert segment_picture(letters).image.materials.labels.tolist() == [0, 252]
