@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 
 F = TypeVar("F")
 _KERNELS: list[Any] = []
@@ -55,7 +55,7 @@ def _compiled(function: F, **flags: Any) -> F:
     compiled: Any = numba.njit(**flags)(function)
     if not hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT: the function itself
         return compiled  # type: ignore[no-any-return]
-    _keep_on_disk(compiled)
+    compiled._cache = _LateCache(compiled)
     _ignore_literals(compiled)
     if flags.get("no_cpython_wrapper"):
         _keep_from_python(compiled)
@@ -83,17 +83,31 @@ def _keep_from_python(compiled: Any) -> None:
     compiled.add_overload = add_overload
 
 
-def _keep_on_disk(compiled: Any) -> None:
-    """Give a function the cache of its machine code; none where no folder can be written."""
+class _LateCache:
+    """Stands for the cache of a function until that is asked for: at most starts few are, of the 200 that there are.
+
+    Numba tries for each whether its folder can be written.
+    """
+
+    def __init__(self, compiled: Any) -> None:
+        self._compiled = compiled
+
+    def __getattr__(self, name: str) -> Any:
+        self._compiled._cache = cache = _cache_of(self._compiled.py_func)
+        return getattr(cache, name)
+
+
+def _cache_of(function: Any) -> Any:
+    """Return the cache of a function's machine code; one that keeps nothing where no folder can be written."""
     try:
-        compiled._cache = _KernelCache(compiled.py_func)
+        return _KernelCache(function)
     except RuntimeError:  # Numba's "no locator available"
         folder, asked = _temporary_folder(), numba.config.CACHE_DIR
         if folder is None:
-            return
+            return NullCache()
         numba.config.CACHE_DIR = folder
         try:
-            compiled._cache = _KernelCache(compiled.py_func)
+            return _KernelCache(function)
         finally:
             numba.config.CACHE_DIR = asked
 
@@ -188,14 +202,21 @@ def share_on_disk() -> float:
 
     Where it is near 0 a run takes half a minute longer, for compiling.
     """
-    folders = {getattr(getattr(k, "_cache", None), "cache_path", None) for k in _KERNELS}
-    if folders == {None} or not _KERNELS:
+    folders = folders_on_disk()
+    if not folders:
         return 1.0
-    kept = {f.name.rsplit("-", 1)[0]: f.stat().st_mtime for p in folders if p for f in Path(p).glob("*.nbi")}
+    kept = {f.name.rsplit("-", 1)[0]: f.stat().st_mtime for folder in folders for f in folder.glob("*.nbi")}
     written = {k.py_func.__code__.co_filename: 0.0 for k in _KERNELS}
     written = {file: Path(file).stat().st_mtime for file in written}
     fresh = [kept.get(_name_on_disk(k), 0.0) >= written[k.py_func.__code__.co_filename] for k in _KERNELS]
     return sum(fresh) / len(fresh)
+
+
+def folders_on_disk() -> list[Path]:
+    """Return where the machine code of the kernels imported so far is kept; nowhere if no folder can be written."""
+    of_each_file = {k.py_func.__code__.co_filename: k for k in _KERNELS}
+    paths = {k._cache.cache_path for k in of_each_file.values()}
+    return sorted(Path(path) for path in paths if path)
 
 
 def _name_on_disk(compiled: Any) -> str:

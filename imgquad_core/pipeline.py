@@ -187,6 +187,7 @@ def mesh_image(image: Source, options: MeshOptions | None = None) -> QuadMesh:
     return run(image, options).mesh
 
 
+@ahead.compiling
 def run(
     source: Source | Segmentation,
     options: MeshOptions | None = None,
@@ -210,7 +211,6 @@ def run(
     options = MeshOptions() if options is None else options
     if not isinstance(options, MeshOptions):
         raise InputError(f"options is {options!r}: give a MeshOptions")
-    ahead.start()
     timed = _Stopwatch(progress)
     raw = source if isinstance(source, Segmentation) else _read(source, options, timed)
     found = raw if isinstance(raw, Segmentation) else _segmented(raw, options, timed, made)

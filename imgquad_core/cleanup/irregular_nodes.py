@@ -61,6 +61,8 @@ class Memory(NamedTuple):
     reach: Ints  # up to which number of quads, or `BY_ITSELF`
     gain: Ints  # of the last pattern that was tried then
     size: Ints  # quads of its cavity
+    cost: Ints  # irregularity of each face
+    least: Ints  # what it cannot fall below
     now: Ints  # (1,)
 
 
@@ -86,17 +88,29 @@ def clean_up(mesh: FaceQuads, how: CleanUp, seeds: Flags | None = None) -> FaceQ
     largest = max(how.sizes)
     net = net_of(mesh, largest)
     cavity, canvas = scratch(net, largest)
-    memory = _empty_memory(len(net.valence), int(mesh.face.max()) + 1)
+    memory = memory_of(net, len(mesh.points))
     begins = padded(np.ones(len(mesh.points), bool) if seeds is None else seeds, len(net.valence), True)
     for size in how.sizes:
         _clean_pass(net, cavity, canvas, begins, memory, size, how.tolerance, how.worst, size > how.thorough)
     return compact(net, mesh)
 
 
-def _empty_memory(n_nodes: int, n_faces: int) -> Memory:
-    a_node = (np.zeros(n_nodes, np.int64) for _ in range(5))
-    changed, tried, reach, gain, size = a_node
-    return Memory(changed, np.zeros(n_faces, np.int64), tried, reach, gain, size, np.zeros(1, np.int64))
+def memory_of(net: Net, n: int) -> Memory:
+    """Return the memory of a mesh of n nodes before any search.
+
+    The sum of wanted less present quads over the nodes of a face is the same for all meshes of it (Euler), and no node
+    has less irregularity than it lacks quads or has too many: the sum is what irregularity cannot fall below.
+    """
+    n_faces = int(net.face.max()) + 1
+    used = np.flatnonzero(net.valence[:n])
+    face = net.face[net.ring[used, 0]]
+    more = (net.valence - net.wanted)[used]
+    cost = np.where(net.rim[used], np.maximum(-4 * more, 2 * more), np.maximum(2 * np.abs(more) - 1, 0))  # `penalty`
+    changed, tried, reach, gain, size = (np.zeros(len(net.valence), np.int64) for _ in range(5))
+    cost, least = (np.bincount(face, values, n_faces).astype(np.int64) for values in (cost, more))
+    return Memory(
+        changed, np.zeros(n_faces, np.int64), tried, reach, gain, size, cost, np.abs(least), np.zeros(1, np.int64)
+    )
 
 
 @verb
@@ -245,7 +259,7 @@ def _search(
             gain = _choose(net, cavity, cut, last_gain, last_size)
             if gain > 0:
                 if _has_room(net, cavity, cut) and _draw_better(net, cavity, canvas, cut, gain, tolerance, worst):
-                    outcome = FOUND
+                    outcome, memory.gain[v] = FOUND, gain
                     break
                 last_gain, last_size = gain, size
         grown = push_all(net, cavity) if cavity.tally[CORNERS] < 2 else push_side(net, cavity)
@@ -285,14 +299,16 @@ def _clean_pass(
             continue
         if crowded_only and net.valence[v] < net.wanted[v]:
             continue
-        known, outcome = memory.reach[v], CHANGED
-        if known == BY_ITSELF and memory.face_changed[net.face[net.ring[v, 0]]] <= memory.tried[v]:
+        face, known, outcome = net.face[net.ring[v, 0]], memory.reach[v], CHANGED
+        if memory.cost[face] <= memory.least[face]:
+            continue
+        if known == BY_ITSELF and memory.face_changed[face] <= memory.tried[v]:
             continue
         while outcome == CHANGED:
             outcome = _search(net, cavity, canvas, cut, memory, v, known, largest, tolerance, worst)
             known = 0
         if outcome == FOUND:
-            face = net.face[cavity.members[0]]
+            memory.cost[face] -= memory.gain[v]
             remove(net, cavity)
             insert(net, canvas, new_id, face)
             _remember_change(cavity, memory, face, new_id, canvas.tally[POINTS])

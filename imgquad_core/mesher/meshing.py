@@ -33,6 +33,7 @@ from .strides import LEAST_WIDTH, consistent, mesh_faces
 FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60 degrees give .866
 
 
+@ahead.compiling
 def mesh_boundaries(
     graph: BoundaryGraph, options: MeshingOptions | None = None, materials: Materials | None = None
 ) -> QuadMesh:
@@ -58,7 +59,6 @@ def mesh_boundaries(
     TopologyError
         If the chains cross.
     """
-    ahead.start()
     options = options or MeshingOptions()
     graph = consistent(graph, np.ones(graph.n_chains, bool), options.triangulator)
     graph = with_short_chains_halved(graph, LEAST_WIDTH)

@@ -36,7 +36,8 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
-    for command in (cli.run, cli.stack, cli.tiles, cli.demo, cli.studio, cli.script, cli.list_filters):
+    commands = (cli.run, cli.stack, cli.tiles, cli.demo, cli.studio, cli.script, cli.list_filters, cli.warm)
+    for command in commands:
         command.add_parser(subparsers)
     return parser
 

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from threading import Timer
 
 import numpy as np
 import pytest
@@ -97,6 +98,25 @@ def test_the_second_process_is_of_this_package_in_any_folder(tmp_path: Path, mon
     process = ahead.start.__wrapped__()
     assert process is not None
     assert process.wait(ahead.LONGEST) == 0
+
+
+def test_first_starts_side_by_side_wait_for_each_other(tmp_path: Path) -> None:
+    fcntl = pytest.importorskip("fcntl")
+    kernels = tmp_path / "kernels"
+    kernels.mkdir()
+    other = os.open(kernels, os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    ahead.take_turn(kernels, 0.2)
+    assert not ahead._HELD  # patience is over: it compiles, too
+    Timer(0.2, os.close, [other]).start()
+    ahead.take_turn(kernels, 60.0)
+    assert len(ahead._HELD) == 1
+    again = os.open(kernels, os.O_RDONLY)
+    with pytest.raises(BlockingIOError):
+        fcntl.flock(again, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    ahead.end_turn()
+    fcntl.flock(again, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    os.close(again)
 
 
 def test_arrays_that_may_be_read_only_compile_no_kernel_again() -> None:

@@ -1,3 +1,3 @@
-from . import console, demo, list_filters, run, script, stack, studio, tiles
+from . import console, demo, list_filters, run, script, stack, studio, tiles, warm
 
-__all__ = ["console", "demo", "list_filters", "run", "script", "stack", "studio", "tiles"]
+__all__ = ["console", "demo", "list_filters", "run", "script", "stack", "studio", "tiles", "warm"]

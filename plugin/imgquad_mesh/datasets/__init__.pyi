@@ -3,8 +3,10 @@ from .fields import MATERIAL_FIELDS, materials_of, put_calibration, put_material
 from .grids import flattened, from_grid, plain_grid, quads_of, to_fe_grid, to_grid, to_mesh
 from .images import image_array, image_placement, scalars_of, segmented, with_materials
 from .lines import Boundaries, chain_lines, from_lines, to_lines
+from .metaimage import VTK_EXTENSIONS
 from .placement import Placement
-from .vtk_files import VTK_EXTENSIONS, read_vtk, silent_vtk
+from .quad_grids import quad_grid
+from .vtk_files import read_vtk, silent_vtk
 
 __all__ = [
     "MATERIAL_FIELDS",
@@ -22,6 +24,7 @@ __all__ = [
     "plain_grid",
     "put_calibration",
     "put_materials",
+    "quad_grid",
     "quads_of",
     "read_vtk",
     "scalars_of",

@@ -7,12 +7,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkStringArray
+
+if TYPE_CHECKING:  # files are written without PyVista, which takes longer to load than a small picture to mesh
+    import pyvista as pv
 
 #: what a name of a component cannot hold: VTK writes it into the file without escapes
 UNSAFE = re.compile(r'[<>&"\s\x00-\x1f]+')
@@ -20,13 +24,18 @@ UNSAFE = re.compile(r'[<>&"\s\x00-\x1f]+')
 
 def put_texts(dataset: pv.DataObject, name: str, texts: Iterable[str]) -> None:
     """Store texts in a field array, in place. PyVista refuses other letters than ASCII there; VTK takes them."""
-    from vtkmodules.vtkCommonCore import vtkStringArray
-
     array = vtkStringArray()
     array.SetName(name)
     for text in texts:
         array.InsertNextValue(text.encode("utf-8", "replace").decode())
     dataset.GetFieldData().AddArray(array)
+
+
+def put_numbers(dataset: Any, name: str, values: Any, part: str = "Field") -> None:
+    """Store numbers in an array of a dataset of VTK or PyVista, in place; `part`: of Field, Cell or Point data."""
+    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+    array.SetName(name)
+    getattr(dataset, f"Get{part}Data")().AddArray(array)
 
 
 def texts_of(array: NDArray[Any]) -> tuple[str, ...]:
@@ -35,33 +44,44 @@ def texts_of(array: NDArray[Any]) -> tuple[str, ...]:
     return tuple(map(str, values if values.dtype != np.uint8 else _texts(values) or ()))
 
 
-def for_vtu(dataset: pv.DataSet) -> pv.DataSet:
+def for_vtu(dataset: Any) -> Any:
     """Return a shallow copy with bytes for text arrays of field data: a text a column, UTF-8, filled up with 0.
 
     Each column is named by its text, too, so that ParaView shows it and an editor finds it in the file. Names of other
     arrays are escaped, as VTK does not: a set of a material "a<b" would spoil the file.
     """
-    copy = dataset.copy(deep=False)
-    for arrays in (copy.point_data, copy.cell_data):
-        for name in [name for name in arrays.keys() if name != quoted(name)]:  # noqa: SIM118
-            arrays[quoted(name)] = arrays.pop(name)
-    for name in copy.field_data.keys():  # noqa: SIM118
-        values = np.atleast_1d(copy.field_data[name])
-        if values.dtype.kind == "U" and values.size:
-            texts = values.ravel().tolist()
-            copy.field_data[name] = _table(texts)
-            array = copy.GetFieldData().GetAbstractArray(name)
+    copy = dataset.NewInstance()
+    copy.ShallowCopy(dataset)
+    for arrays in (copy.GetPointData(), copy.GetCellData()):
+        for array in [array for array in _arrays(arrays) if array.GetName() != quoted(array.GetName())]:
+            renamed = array.NewInstance()
+            renamed.ShallowCopy(array)
+            renamed.SetName(quoted(array.GetName()))
+            arrays.RemoveArray(array.GetName())
+            arrays.AddArray(renamed)
+    for array in _arrays(copy.GetFieldData()):
+        texts = [array.GetValue(row) for row in range(array.GetNumberOfValues())] if _holds_texts(array) else []
+        if texts:
+            put_numbers(copy, array.GetName(), _table(texts))
+            table = copy.GetFieldData().GetAbstractArray(array.GetName())
             for column, text in enumerate(texts):
-                array.SetComponentName(column, _label(text))
+                table.SetComponentName(column, _label(text))
     return copy
+
+
+def _arrays(fields: Any) -> list[Any]:
+    return [fields.GetAbstractArray(index) for index in range(fields.GetNumberOfArrays())]
+
+
+def _holds_texts(array: Any) -> bool:
+    return bool(array.IsA("vtkStringArray"))
 
 
 def restore_texts(dataset: pv.DataObject) -> None:
     """Turn tables of bytes back into text arrays, in place: only where the columns are named by what they hold."""
-    fields = dataset.GetFieldData()
-    for array in [fields.GetAbstractArray(index) for index in range(fields.GetNumberOfArrays())]:
+    for array in _arrays(dataset.GetFieldData()):
         if array.GetDataTypeAsString() == "unsigned char" and array.HasAComponentName():
-            texts = _texts(pv.convert_array(array))
+            texts = _texts(vtk_to_numpy(array))
             names = [array.GetComponentName(column) for column in range(array.GetNumberOfComponents())]
             if texts is not None and names == [_label(text) for text in texts]:
                 put_texts(dataset, array.GetName(), texts)

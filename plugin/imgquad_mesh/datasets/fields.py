@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 
 from imgquad_core.model import Materials
 from imgquad_core.reading import Calibration
 
-from .field_texts import put_texts, texts_of
+from .field_texts import put_numbers, put_texts, texts_of
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 NUMBERS, NAMES, COLORS = MATERIAL_FIELDS = ("material_numbers", "material_names", "material_colors")
 #: of grains: phase and Bunge's Euler angles (degrees, NaN where unknown) of each
 PHASES, ORIENTATIONS = CRYSTAL_FIELDS = ("material_phases", "material_orientations")
 
 
-def put_materials(dataset: pv.DataSet, materials: Materials) -> None:
+def put_materials(dataset: Any, materials: Materials) -> None:
     """Store what the materials are called in the field arrays of a dataset, in place."""
-    dataset.field_data[NUMBERS] = materials.labels
+    put_numbers(dataset, NUMBERS, materials.labels)
     put_texts(dataset, NAMES, materials.names)
-    dataset.field_data[COLORS] = materials.colors
+    put_numbers(dataset, COLORS, materials.colors)
     if materials.phases is not None:
         put_texts(dataset, PHASES, materials.phases)
     if materials.orientations is not None:
-        dataset.field_data[ORIENTATIONS] = materials.orientations
+        put_numbers(dataset, ORIENTATIONS, materials.orientations)
 
 
 def materials_of(dataset: pv.DataSet, present: NDArray[Any] | None = None) -> Materials:
@@ -50,7 +52,7 @@ def _crystals(fields: Any) -> tuple[tuple[str, ...] | None, NDArray[Any] | None]
 
 
 def put_calibration(
-    dataset: pv.DataSet,
+    dataset: Any,
     found: Calibration,
     placement: tuple[tuple[float, float], tuple[float, float]] | None = None,
 ) -> None:
@@ -58,7 +60,7 @@ def put_calibration(
 
     Parameters
     ----------
-    dataset : pyvista.DataSet
+    dataset : pyvista.DataSet or vtkUnstructuredGrid
         An image or a mesh.
     found : Calibration
         What the file says.
@@ -67,12 +69,13 @@ def put_calibration(
     """
     size = found.size
     if placement is not None:
-        dataset.field_data["pixel_size"], dataset.field_data["origin"] = map(list, placement)
+        for name, values in zip(("pixel_size", "origin"), placement, strict=True):
+            put_numbers(dataset, name, np.array(values, np.float64))
     elif size is not None and (not size.doubt or found.crs):
         dataset.spacing = (size.x, size.y, 1.0)
         dataset.origin = (*(found.origin or (0.0, 0.0)), 0.0)
     if size is not None:
-        dataset.field_data["file_pixel_size"] = [size.x, size.y]
+        put_numbers(dataset, "file_pixel_size", np.array([size.x, size.y], np.float64))
         for name, text in (("unit", size.unit), ("source", size.source), ("doubt", size.doubt)):
             put_texts(dataset, f"file_pixel_size_{name}", [text])
     if found.crs:

@@ -15,6 +15,7 @@ from imgquad_core.writers.common import safe_names
 
 from .fields import MATERIAL_FIELDS, materials_of, put_materials
 from .placement import PLAIN, Placement
+from .quad_grids import quad_grid
 
 FLAT = 1e-6  #: largest distance from the plane, relative to the extent
 #: VTK cell of each element kind
@@ -36,16 +37,7 @@ def to_grid(mesh: QuadMesh, placement: Placement = PLAIN) -> pv.UnstructuredGrid
     `orientation` (Bunge's Euler angles, degrees, shape (n, 3)) and the field arrays `material_phases` and
     `material_orientations`.
     """
-    quads = mesh.quads[:, ::-1] if placement.mirrored else mesh.quads
-    grid = pv.UnstructuredGrid({pv.CellType.QUAD: quads}, placement.place(mesh.points))
-    grid.cell_data["region"] = mesh.quad_region.astype(np.int32)
-    grid.cell_data["material"] = mesh.quad_material
-    put_materials(grid, mesh.materials)
-    if mesh.materials.orientations is not None:
-        rows = np.searchsorted(mesh.materials.labels, mesh.quad_material)
-        grid.cell_data["orientation"] = mesh.materials.orientations[rows]
-    grid.set_active_scalars("material", preference="cell")
-    return grid
+    return pv.UnstructuredGrid(quad_grid(mesh, placement))
 
 
 def quads_of(grid: pv.DataObject) -> NDArray[np.int64]:

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 from imgquad_core.errors import InputError
 
+#: extensions of pictures that VTK reads
+VTK_EXTENSIONS = (".vti", ".mha", ".mhd")
 _LONGEST_HEADER = 1 << 16
 _BYTES = {
     "CHAR": 1, "UCHAR": 1, "SHORT": 2, "USHORT": 2, "INT": 4, "UINT": 4, "LONG": 4, "ULONG": 4,

@@ -19,7 +19,8 @@ from imgquad_core.reading.picture import Picture
 from .field_texts import put_texts
 from .fields import put_calibration, put_materials
 from .images import MATERIAL, OPAQUE, PALETTE, PICTURE, VOID_PIXELS
-from .vtk_files import VTK_EXTENSIONS, read_vtk
+from .metaimage import VTK_EXTENSIONS
+from .vtk_files import read_vtk
 
 
 def read_any(path: str | Path, options: ReadOptions | None = None, name: str | None = None) -> Picture:

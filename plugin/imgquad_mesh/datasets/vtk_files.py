@@ -23,9 +23,6 @@ from .fields import materials_of
 from .images import MATERIAL, pixel_counts
 from .metaimage import assert_whole
 
-#: extensions of what is read here
-VTK_EXTENSIONS = (".vti", ".mha", ".mhd")
-
 
 @contextmanager
 def silent_vtk() -> Iterator[None]:

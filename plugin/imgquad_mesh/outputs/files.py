@@ -90,10 +90,11 @@ def write_mesh_file(
     if options.pop("plain", False):
         _write_plain(made or core.fe.fe_mesh(mesh), path)
     elif path.suffix.lower() in GRID_EXTENSIONS:
-        grid = datasets.to_fe_grid(made) if made else datasets.to_grid(mesh)
+        is_vtu = path.suffix.lower() == ".vtu"
+        grid = datasets.to_fe_grid(made) if made else (datasets.quad_grid if is_vtu else datasets.to_grid)(mesh)
         if complete:
             complete(grid)
-        saved = datasets.for_vtu(grid) if path.suffix.lower() == ".vtu" else grid
+        saved = datasets.for_vtu(grid) if is_vtu else grid
         replace_file(path, lambda temporary: save_dataset(saved, temporary))
     else:
         core.writers.write_mesh(made or mesh, path, **options)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from imgquad_core.cleanup.cavity import compact, net_of, scratch
 from imgquad_core.cleanup.faces import FaceQuads
-from imgquad_core.cleanup.irregular_nodes import CleanUp, clean_up
+from imgquad_core.cleanup.irregular_nodes import CleanUp, _clean_pass, clean_up, memory_of
 from imgquad_core.cleanup.relaxation import laplace, rings_of
 from imgquad_core.mesher.splitting import split_composed
 from support import naive
@@ -135,3 +138,36 @@ def test_turned_edges_in_a_grid_are_turned_back(turned: list[int]) -> None:
     assert irregularity(new) == 0
     assert len(new.quads) == 64
     assert_valid_faces(new)
+
+
+def without_memory(mesh: FaceQuads, how: CleanUp) -> FaceQuads:
+    """Clean up with every search done anew, whatever the one before has found."""
+    net = net_of(mesh, max(how.sizes))
+    cavity, canvas = scratch(net, max(how.sizes))
+    begins = np.ones(len(net.valence), bool)
+    for size in how.sizes:
+        memory = memory_of(net, len(net.valence))
+        memory.least[:] = -1
+        _clean_pass(net, cavity, canvas, begins, memory, size, how.tolerance, how.worst, size > how.thorough)
+    return compact(net, mesh)
+
+
+@pytest.mark.parametrize("sizes", [(16, 40, 80), (40, 160, 160), (80, 16)])
+@pytest.mark.parametrize("make", [composed, triangles_split])
+def test_searches_that_are_left_out_would_have_been_in_vain(
+    make: Callable[[int], FaceQuads], sizes: tuple[int, ...]
+) -> None:
+    mesh, how = make(2), CleanUp(sizes, 0.5, 0.6)
+    one, other = clean_up(mesh, how), without_memory(mesh, how)
+    assert len(one.quads) != len(mesh.quads)
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_no_mesh_of_a_face_is_less_irregular_than_its_memory_tells() -> None:
+    mesh = composed(1)
+    before, after = (memory_of(net_of(m, 80), len(m.points)) for m in (mesh, clean_up(mesh, NORMAL)))
+    np.testing.assert_array_equal(before.least, after.least)
+    assert (after.cost >= after.least).all()
+    assert (after.cost <= before.cost).all()
+    assert after.cost.sum() < before.cost.sum()
