@@ -2,7 +2,7 @@
 
     python benchmarks/run.py                      quality, wedges, speed, growth, cold: about 10 minutes
     python benchmarks/run.py speed cold           some parts; the others' tables stay as they are
-    python benchmarks/run.py all                  all: pictures, noise and triangulators take 15, 10 and 2 minutes more
+    python benchmarks/run.py all                  all: pictures 15, noise 10, triangulators 2, waits 4 minutes more
     python benchmarks/run.py --out docs/benchmarks.md
 
 Each part prints its section and, with --out, replaces what stands between its two marks in that page. The machine
@@ -28,6 +28,7 @@ import quality
 import real_pictures
 import speed
 import triangulators
+import waits
 import wedges
 from imgquad_mesh.outputs.report import versions
 
@@ -36,6 +37,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "wedges": wedges.section,
     "speed": speed.section,
     "triangulators": triangulators.section,
+    "waits": waits.section,
     "growth": growth.section,
     "cold": cold_start.section,
     "pictures": real_pictures.section,
