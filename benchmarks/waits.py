@@ -53,10 +53,8 @@ def section(folder: Path) -> str:
     }
     found = {name: [_run(*asked, threads) for threads in (1, 0)] for name, asked in pictures.items()}
     rows = [[name, *(f"{value:.2f}" for spent in both for value in spent)] for name, both in found.items()]
-    titles = [
-        "picture",
-        *(f"{what}, {who}" for who in ("one thread", "all") for what in ("s", "CPU s", "s of meshing")),
-    ]
+    figures = ("s", "CPU s", "s of meshing")
+    titles = ["picture", *(f"{what}, {who}" for who in ("one thread", "all") for what in figures)]
     small = next(iter(found.values()))[1]
     beyond = _script(folder, pictures["B1"][0])
     checks = [

@@ -13,7 +13,7 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 from imgquad_core.fe import make_elements
 from imgquad_core.fe.elements import ElementOptions
 from imgquad_mesh.datasets import from_grid, materials_of, to_grid
-from imgquad_mesh.datasets.field_texts import restore_texts
+from imgquad_mesh.datasets.field_texts import put_texts, restore_texts
 from imgquad_mesh.outputs.files import write_mesh_file
 from support.handmade import disk, jiggle, staircase
 
@@ -96,8 +96,8 @@ def test_bytes_of_others_stay_bytes() -> None:
 
 def test_texts_without_signs_are_kept(tmp_path: Path) -> None:
     def add(grid: Any) -> None:
-        grid.field_data["unit"] = [""]
-        grid.field_data["two"] = ["", "b"]
+        put_texts(grid, "unit", [""])
+        put_texts(grid, "two", ["", "b"])
 
     write_mesh_file(MESH, tmp_path / "a.vtu", None, add)
     grid = pv.read(tmp_path / "a.vtu")

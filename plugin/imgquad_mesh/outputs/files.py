@@ -79,7 +79,7 @@ def write_mesh_file(
 ) -> core.fe.FEMesh | None:
     """Write `mesh`, as the `elements` asked for, in the format that the extension of `path` names.
 
-    `complete` adds to the grid that VTK writes.
+    `complete` adds to the grid that VTK writes, which is one of VTK's own for ``.vtu``.
 
     Returns
     -------
