@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -34,7 +36,8 @@ def draw(page: Page) -> None:
     page.evaluate("studio.view.look({ x: 150, y: 120, scale: 5 })")
     page.select_option("#shade", "jacobian")
     time.sleep(1)
-    page.screenshot(path=Path(__file__).with_name("images") / "studio.png")
+    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    picture.quantize(128).save(Path(__file__).with_name("images") / "studio.png", optimize=True)
 
 
 def main() -> None:
