@@ -305,6 +305,7 @@ async function download(what) {
   } catch (error) {
     if (error.name !== "AbortError") say(error.message);
   }
+  work(); // on what was changed meanwhile
 }
 
 function saveText(what) {
