@@ -62,7 +62,7 @@ def for_vtu(dataset: Any) -> Any:
     for array in _arrays(copy.GetFieldData()):
         texts = [array.GetValue(row) for row in range(array.GetNumberOfValues())] if _holds_texts(array) else []
         if texts:
-            put_numbers(copy, array.GetName(), _table(texts))
+            put_numbers(copy, array.GetName(), table_of(texts))
             table = copy.GetFieldData().GetAbstractArray(array.GetName())
             for column, text in enumerate(texts):
                 table.SetComponentName(column, _label(text))
@@ -87,7 +87,8 @@ def restore_texts(dataset: pv.DataObject) -> None:
                 put_texts(dataset, array.GetName(), texts)
 
 
-def _table(texts: list[str]) -> NDArray[np.uint8]:
+def table_of(texts: list[str]) -> NDArray[np.uint8]:
+    """Return texts as bytes: a text a column, UTF-8, filled up with 0."""
     columns = [text.encode() for text in texts]
     width = max(1, *map(len, columns))
     return np.frombuffer(b"".join(column.ljust(width, b"\0") for column in columns), np.uint8).reshape(-1, width).T

@@ -139,9 +139,9 @@ def _made(group: Any, name: str, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def _put_fields(root: Any, materials: Materials) -> None:
-    import h5py
+    from imgquad_mesh.datasets.field_texts import table_of
 
     fields = root.create_group("FieldData")
     fields["material_numbers"] = materials.labels
-    fields.create_dataset("material_names", data=list(materials.names), dtype=h5py.string_dtype(), track_times=False)
+    fields["material_names"] = table_of(list(materials.names))  # VTK 9.7 crashes at texts in partitioned files
     fields["material_colors"] = materials.colors

@@ -272,8 +272,9 @@ def _steps(job: Job, stored: Any, form: str) -> Iterator[Step]:
         yield Step(f"finish-{t}", Guarded(work.finish), (job, t, [Result(_meshed_key(t)), *bands]))
     for t in every:
         yield Step(f"number-{t}", Guarded(work.number), (job, t, after("finish", grid.around(t))))
+    yield Step("counts", list, (after("number", every),))
     for t in every:
-        yield Step(f"piece-{t}", Guarded(write_piece), (job, t, after("number", every), form))
+        yield Step(f"piece-{t}", Guarded(write_piece), (job, t, Result("counts"), form))
 
 
 def _band_steps(job: Job) -> Iterator[Step]:

@@ -18,6 +18,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.tiles import tasks
 from imgquad_mesh.__main__ import main
+from imgquad_mesh.datasets.field_texts import texts_of
 from imgquad_mesh.large import TiledMesh, mesh_tiles
 from support.invariants import assert_valid_mesh
 from support.labels import label_image
@@ -132,28 +133,29 @@ def _kill_once(flag: str) -> None:
 
 
 def test_same_bytes_after_a_kill_a_full_disk_and_lost_files(
-    client: Any, picture: Path, made: TiledMesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cluster: Any, picture: Path, made: TiledMesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    distributed = pytest.importorskip("distributed")
     save = tasks.save_arrays
 
     def full(path: Path, **arrays: Any) -> None:
-        if path.name == "mesh-1.npz":
-            raise InputError("cannot write mesh-1.npz: No space left on device")
+        if path.name == "mesh-1-0.npz":
+            raise InputError("cannot write mesh-1-0.npz: No space left on device")
         save(path, **arrays)
 
     monkeypatch.setattr(tasks, "save_arrays", full)
     with pytest.raises(InputError, match="No space left on device"):
-        meshed(picture, tmp_path / "out", client=None)
+        meshed(picture, tmp_path / "out")
     monkeypatch.undo()
     work = tmp_path / "out" / "work"
     kept = {path.name: path.stat().st_mtime_ns for path in work.glob("outlines-*.npz")}
     assert len(kept) == 6
-    assert not (work / "mesh-1.npz").exists()
+    assert not (work / "mesh-1-0.npz").exists()
     for path in (work / "outlines-3.npz", work / "ids-0.npy"):
         path.unlink()
-    # a worker dies in the middle of the second run
-    client.submit(_kill_once, str(tmp_path / "flag"), key=f"kill-{tmp_path}")
-    meshed(picture, tmp_path / "out", client=client)
+    with distributed.Client(cluster, set_as_default=False) as client:  # a worker dies in the middle of the second run
+        client.submit(_kill_once, str(tmp_path / "flag"), key=f"kill-{tmp_path}")
+        meshed(picture, tmp_path / "out", client=client)
     assert digests(tmp_path / "out") == digests(made.path.parent)
     later = {path.name: path.stat().st_mtime_ns for path in work.glob("outlines-*.npz")}
     assert {name for name in kept if later[name] != kept[name]} == {"outlines-3.npz"}
@@ -199,6 +201,7 @@ def test_command_writes_partitions_and_a_deck(
     assert isinstance(whole, pv.PartitionedDataSet)
     assert whole.n_partitions == 2
     report = json.loads((folder / "report.json").read_text())
+    assert texts_of(whole[0].field_data["material_names"])[2] == "material 2"
     assert sum(part.n_cells for part in whole) == report["quality"]["n_quads"]
     assert sum(part.area for part in whole) == pytest.approx(SHAPE[0] * SHAPE[1] / 4)
     read = meshio.read(deck)
