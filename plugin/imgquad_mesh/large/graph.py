@@ -93,7 +93,7 @@ def _completed(client: Any, futures: list[Any]) -> Iterator[Any]:
     from distributed import as_completed
 
     left = set(futures)
-    for future in as_completed(futures):
+    for future in as_completed(futures, loop=client.loop):
         left.discard(future)
         yield future
     if left:
