@@ -73,7 +73,7 @@ def debian(program: str, script: str, package: str, **common: str) -> Callable[.
 
 mfem = pip("MFEM", "mfem_heat.py", "mfem")
 ngsolve = pip("NGSolve", "ngsolve_heat.py", "ngsolve")
-sfepy = pip("SfePy", "sfepy_heat.py", "sfepy", **PLAIN)
+sfepy = debian("SfePy", "sfepy_heat.py", "python3-sfepy", **PLAIN)
 felupe = pip("FElupe", "felupe_force.py", "felupe", *MESHIO)
 skfem = pip("scikit-fem", "skfem_heat.py", "scikit-fem", *MESHIO)
 kratos = pip("Kratos", "kratos_force.py", *KRATOS)

@@ -7,6 +7,8 @@ from sfepy.base.base import output
 from sfepy.discrete import Equation, Equations, FieldVariable, Integral, Material, Problem
 from sfepy.discrete.conditions import Conditions, EssentialBC
 from sfepy.discrete.fem import FEDomain, Field, Mesh
+from sfepy.solvers.ls import ScipyDirect
+from sfepy.solvers.nls import Newton
 from sfepy.terms import Term
 
 output.set_output(quiet=True)
@@ -27,6 +29,7 @@ terms = [
 ]
 problem = Problem("heat", equations=Equations([Equation("balance", terms[0] + terms[1])]))
 problem.set_bcs(ebcs=Conditions([EssentialBC("cold", left, {"T.0": 0.0}), EssentialBC("hot", right, {"T.0": 1.0})]))
+problem.set_solver(Newton({}, lin_solver=ScipyDirect({})))
 problem.solve(save_results=False)
 flow = sum(
     problem.evaluate(f"dw_diffusion.2.{layer.name}(k.{value}, T, T)", mode="eval", k=k, T=T)
