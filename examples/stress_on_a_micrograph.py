@@ -19,12 +19,12 @@ import pyvista as pv
 
 from imgquad_core import MeshOptions, mesh_image
 from imgquad_core.writers import write_mesh
-from imgquad_mesh.cli.rock_picture import rock_picture
+from imgquad_mesh.outputs import draw_rock
 
 
 def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    rock_picture().save(folder / "rock.png")
+    draw_rock().save(folder / "rock.png")
     mesh = mesh_image(folder / "rock.png", MeshOptions(size=4.0, min_pixels=12, min_length=6, pixel_size=1e-5))
     moduli = np.geomspace(20e9, 200e9, len(mesh.materials.names))
     values = {name: {"young": e, "poisson": 0.2} for name, e in zip(mesh.materials.names, moduli, strict=True)}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import imgquad_core as core
-from imgquad_mesh import cli
+from imgquad_mesh import outputs
 
 SMALL = (120, 80)  #: columns and rows of the pictures
 
@@ -37,8 +37,8 @@ def execute(args: argparse.Namespace) -> int:
 
 def _pictures() -> Iterator[NDArray[Any]]:
     """Give labels, a photograph in grey, and colours."""
-    labels = cli.rock_picture.rock_labels(*SMALL, grain=24)
+    labels = outputs.rock_labels(*SMALL, grain=24)
     yield labels
     noise = np.random.default_rng(0).normal(0, 6, labels.shape)
     yield (40 * labels + noise).clip(0, 255).astype(np.uint8)
-    yield np.array(cli.rock_picture.PALETTE, np.uint8)[labels]
+    yield np.asarray(outputs.draw_rock().crop((0, 0, *SMALL)))

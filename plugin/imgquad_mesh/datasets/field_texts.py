@@ -33,7 +33,7 @@ def put_texts(dataset: pv.DataObject, name: str, texts: Iterable[str]) -> None:
 
 def put_numbers(dataset: Any, name: str, values: Any, part: str = "Field") -> None:
     """Store numbers in an array of a dataset of VTK or PyVista, in place; `part`: of Field, Cell or Point data."""
-    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)  # type: ignore[no-untyped-call]
     array.SetName(name)
     getattr(dataset, f"Get{part}Data")().AddArray(array)
 
@@ -81,7 +81,7 @@ def restore_texts(dataset: pv.DataObject) -> None:
     """Turn tables of bytes back into text arrays, in place: only where the columns are named by what they hold."""
     for array in _arrays(dataset.GetFieldData()):
         if array.GetDataTypeAsString() == "unsigned char" and array.HasAComponentName():
-            texts = _texts(vtk_to_numpy(array))
+            texts = _texts(vtk_to_numpy(array))  # type: ignore[no-untyped-call]
             names = [array.GetComponentName(column) for column in range(array.GetNumberOfComponents())]
             if texts is not None and names == [_label(text) for text in texts]:
                 put_texts(dataset, array.GetName(), texts)

@@ -7,6 +7,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import VTK_QUAD, vtkCellArray, vtkUnstructuredGrid
 
+from imgquad_core.arrays import Floats, Ints
 from imgquad_core.model import QuadMesh
 
 from .field_texts import put_numbers
@@ -30,15 +31,15 @@ def quad_grid(mesh: QuadMesh, placement: Placement = PLAIN) -> vtkUnstructuredGr
     return grid
 
 
-def _points(places: np.ndarray) -> vtkPoints:
+def _points(places: Floats) -> vtkPoints:
     points = vtkPoints()
-    points.SetData(numpy_to_vtk(np.ascontiguousarray(places), deep=True))
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(places), deep=True))  # type: ignore[no-untyped-call]
     return points
 
 
-def _cells(quads: np.ndarray) -> vtkCellArray:
+def _cells(quads: Ints) -> vtkCellArray:
     cells = vtkCellArray()
     offsets = np.arange(0, 4 * len(quads) + 1, 4, dtype=np.int64)
     corners = np.ascontiguousarray(quads, np.int64).ravel()
-    cells.SetData(numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(corners, deep=True))
+    cells.SetData(numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(corners, deep=True))  # type: ignore[no-untyped-call]
     return cells

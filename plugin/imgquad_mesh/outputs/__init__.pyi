@@ -13,7 +13,7 @@ from .files import (
 )
 from .mesh_picture import draw_materials, material_colors
 from .report import build_report, element_notes
-from .rock_picture import draw_rock
+from .rock_picture import draw_rock, rock_labels
 
 __all__ = [
     "GRID_EXTENSIONS",
@@ -26,6 +26,7 @@ __all__ = [
     "material_colors",
     "mesh_extensions",
     "replace_file",
+    "rock_labels",
     "write_boundaries",
     "write_json",
     "write_labels",
