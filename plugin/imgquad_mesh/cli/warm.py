@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import imgquad_core as core
-from imgquad_mesh import outputs
+from imgquad_mesh import cli, outputs
 
 SMALL = (120, 80)  #: columns and rows of the pictures
 
@@ -41,4 +41,4 @@ def _pictures() -> Iterator[NDArray[Any]]:
     yield labels
     noise = np.random.default_rng(0).normal(0, 6, labels.shape)
     yield (40 * labels + noise).clip(0, 255).astype(np.uint8)
-    yield np.asarray(outputs.draw_rock().crop((0, 0, *SMALL)))
+    yield np.asarray(outputs.draw_rock().convert("RGB").crop((0, 0, *SMALL)))
