@@ -96,6 +96,7 @@ def test_the_second_process_is_of_this_package_in_any_folder(tmp_path: Path, mon
     monkeypatch.setattr(ahead, "share_on_disk", lambda: 0.0)
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
     process = ahead.start.__wrapped__()
+    ahead.end_turn()
     assert process is not None
     assert process.wait(ahead.LONGEST) == 0
 
