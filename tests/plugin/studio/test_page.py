@@ -23,7 +23,7 @@ from support.studio import Studio
 STEPS = ("segment", "denoise", "smooth", "mesh", "mesh")
 
 
-def wait(page: Any, expression: str, seconds: float = 90) -> Any:
+def wait(page: Any, expression: str, seconds: float = 300) -> Any:
     """Wait until an expression holds (`wait_for_function` would need a weaker policy of the page)."""
     end = time.monotonic() + seconds
     while not (found := page.evaluate(expression)):
@@ -59,7 +59,7 @@ def set_slider(page: Any, slider: str, value: float) -> None:
 
 def command(page: Any, flag: str) -> None:
     """Wait until the command line in view holds a text."""
-    wait(page, f"document.getElementById('text').textContent.includes({flag!r})", 20)
+    wait(page, f"document.getElementById('text').textContent.includes({flag!r})")
 
 
 def test_a_dropped_picture_is_seen_and_named(page: Any, rock: Path) -> None:
@@ -295,7 +295,7 @@ def test_a_downloaded_mesh_is_the_commands_file(extension: str, page: Any, rock:
     page.on("download", lambda download: got.append(download))
     page.click("#get-mesh")
     n = 2 if extension == ".xdmf" else 1
-    end = time.monotonic() + 60
+    end = time.monotonic() + 300
     while len(got) < n and time.monotonic() < end:
         page.wait_for_timeout(50)
     import shlex

@@ -239,13 +239,22 @@ function go(to) {
   work();
 }
 
-function steps() {
-  const old = ([, , stage]) => app.results[stage] && !fresh(stage);
-  at("steps").replaceChildren(...STEPS.map((each, k) => {
-    const stale = k > 0 && old(each);
-    const attributes = { type: "button", disabled: !picture, "aria-current": k === step && picture ? "step" : null, onclick: () => (go(k), at(`step${k}`).focus()), id: `step${k}` };
-    return h("li", {}, h("button", attributes, `${k + 1}`, h("span", {}, each[0]), stale ? h("span", { class: "stale", title: "out of date" }, "↻", h("span", { class: "hidden" }, " out of date")) : null));
+function makeSteps() {
+  at("steps").replaceChildren(...STEPS.map(([name], k) => {
+    const stale = h("span", { class: "stale", title: "out of date", hidden: true }, "↻", h("span", { class: "hidden" }, " out of date"));
+    return h("li", {}, h("button", { type: "button", onclick: () => go(k), id: `step${k}` }, `${k + 1}`, h("span", {}, name), stale));
   }));
+}
+
+// In place: a button that is replaced loses the focus, and the click that is under way.
+function steps() {
+  STEPS.forEach(([, , stage], k) => {
+    const button = at(`step${k}`), isCurrent = k === step && Boolean(picture);
+    button.disabled = !picture;
+    button.querySelector(".stale").hidden = !(k > 0 && app.results[stage] && !fresh(stage));
+    if (isCurrent) button.setAttribute("aria-current", "step");
+    else button.removeAttribute("aria-current");
+  });
 }
 
 function changed() {
@@ -463,6 +472,7 @@ async function start() {
   splitting();
   if (app.view) pointers();
   onChange(changed);
+  makeSteps();
   steps();
   history.replaceState(null, "", "/"); // the token has become a cookie
   try {
