@@ -11,8 +11,12 @@ import pytest
 @pytest.fixture(scope="session")
 def cluster() -> Iterator[Any]:
     distributed = pytest.importorskip("distributed")
+    dask = pytest.importorskip("dask")
     options = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
-    with distributed.LocalCluster(n_workers=2, **options) as cluster:
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),  # workers take seconds to start
+        distributed.LocalCluster(n_workers=2, **options) as cluster,
+    ):
         yield cluster
 
 
