@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from imgquad_core.errors import InputError
+from imgquad_core.reading.decoding import assert_pixels
+from imgquad_core.reading.options import ReadOptions
 
 #: extensions of pictures that VTK reads
 VTK_EXTENSIONS = (".vti", ".mha", ".mhd")
@@ -45,19 +47,24 @@ class _Header(NamedTuple):
         return found * int(self.fields.get("ElementNumberOfChannels", "1"))
 
 
-def assert_whole(path: Path) -> None:
+def assert_whole(path: Path, options: ReadOptions) -> None:
     """Raise `InputError` if a MetaImage (.mha, .mhd) does not hold the bytes that its header says.
 
     Raises
     ------
     InputError
-        The header is none, a file of data is missing, or the data are cut off, damaged, or numbers as text.
+        It has more pixels than `options` allow, the header is none, a file of data is missing, or the data are cut off,
+        damaged, or numbers as text.
     """
     try:
         header = _header(path)
         size = header.size
+        rows, columns = sorted(int(side) for side in header.fields["DimSize"].split())[-2:]
+        assert_pixels(path, columns, rows, options)
         files = [path] if header.fields["ElementDataFile"].upper() == "LOCAL" else list(_files(path, header))
         skipped = header.end if files == [path] else max(int(header.fields.get("HeaderSize", "0")), 0)
+    except InputError:
+        raise
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(f"{path} has no header of a MetaImage that can be read ({error}): {_CURE}") from error
     if header.fields.get("BinaryData", "True").lower() in ("false", "0"):

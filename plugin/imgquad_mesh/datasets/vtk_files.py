@@ -71,7 +71,7 @@ def _image(path: Path, options: ReadOptions) -> pv.ImageData:
     """Read a file whose header promises no more than is allowed."""
     is_vti = path.suffix.lower() == ".vti"
     if not is_vti:
-        assert_whole(path)
+        assert_whole(path, options)
     try:
         with silent_vtk():
             reader = pv.XMLImageDataReader(str(path)) if is_vti else pv.get_reader(str(path))  # type: ignore[no-untyped-call]
