@@ -185,7 +185,7 @@ import numpy as np
 from imgquad_core import mesh_image
 from imgquad_core.errors import InputError
 from imgquad_mesh.outputs.files import write_mesh_file
-labels = np.zeros((80, 120), np.int32); labels[20:60, 40:80] = 1
+labels = (np.add.outer(np.arange(80), 7.0 * np.sin(np.arange(120) / 3)) // 10 % 4).astype(np.int32)
 path = Path(sys.argv[1])
 path.write_bytes(b"old")
 try:
