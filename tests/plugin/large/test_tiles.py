@@ -184,7 +184,7 @@ def test_tiles_and_boxes_are_read_when_they_are_asked_for(made: TiledMesh) -> No
     assert centre[:, 0].max() < 700
     assert centre[:, 1].min() > SHAPE[0] - 480
     assert set(part.materials.names) == {f"material {k}" for k in range(5)}
-    with pytest.raises(InputError, match="2 rows of 3 tiles"):
+    with pytest.raises(InputError, match="there is no tile 2, 0: rows are 0 to 1, columns 0 to 2"):
         made[2, 0]
 
 
