@@ -150,14 +150,12 @@ def test_a_vein_of_one_pixel_stays(snr: float, kept: float, invented: float, tol
 def test_noise_is_measured_white_and_correlated() -> None:
     truth = blobs(3, 2)
     white = np.random.default_rng(1).normal(0, 9.0, truth.shape)
-    assert noise_of(levels_of(picture_of(byte(110 + white)), None)) == pytest.approx(9.0, rel=0.1)
-    # many edges are read as noise at stride 2; the class count bears .6 to 1.6 of the truth (segmentation.md 2a)
-    assert 0.9 * 9.0 < noise_of(levels_of(picture_of(byte(40 + 70 * truth + white)), None)) < 1.6 * 9.0
-    # stride 1 alone under-reads noise as of resampling by 30 to 50 % (stronger blur, of .8 pixels, is read as .4)
-    for blur in (0.5, 0.6):
+    for shades in (110 + white, 40 + 70 * truth + white):
+        assert noise_of(levels_of(picture_of(byte(shades)), None)) == pytest.approx(9.0, rel=0.1)
+    for blur in (0.5, 0.6, 0.8):  # as of resampling: between neighbours it is under-read by 30 to 80 %
         smooth = ndimage.gaussian_filter(np.random.default_rng(1).normal(0, 20.0, truth.shape), blur)
         levels = levels_of(picture_of(byte(40 + 70 * truth + smooth)), None)
-        assert 0.6 * smooth.std() < noise_of(levels) < 1.6 * smooth.std()
+        assert 0.5 * smooth.std() < noise_of(levels) < 1.3 * smooth.std()
     assert noise_of(levels_of(picture_of(byte(40 + 70 * truth)), None)) == 0.0
 
 
