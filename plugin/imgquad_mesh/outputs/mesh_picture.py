@@ -17,6 +17,8 @@ from imgquad_core.model import Materials, QuadMesh
 
 PIXELS = 1600  #: of the longer side
 DISTINCT = 40  #: least difference between the colours of two materials, in one channel
+LUMA = np.array([0.299, 0.587, 0.114])  #: of red, green and blue in brightness (ITU-R BT.601)
+DARK = 0.2  #: brightness below which black lines are not seen
 
 
 def draw_materials(mesh: QuadMesh, path: Path) -> None:
@@ -32,7 +34,9 @@ def draw_materials(mesh: QuadMesh, path: Path) -> None:
     faces = colors[np.searchsorted(mesh.materials.labels, mesh.quad_material)]
     edge = np.sqrt(width * height / mesh.n_quads) / longest * PIXELS  # length of an edge in the picture's pixels
     line = float(np.clip(edge / 20, 0.0, 0.8)) if edge > 3 else 0.0
-    drawn = PolyCollection(list(mesh.points[mesh.quads]), facecolors=faces, edgecolors="black", linewidths=line)
+    drawn = PolyCollection(
+        list(mesh.points[mesh.quads]), facecolors=faces, edgecolors=_lines_on(faces), linewidths=line
+    )
     drawn.set_antialiased(line > 0)
     axes.add_collection(drawn)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
@@ -60,6 +64,12 @@ def material_colors(materials: Materials) -> NDArray[np.float64]:
     free = free if len(free) else others
     colors[lost] = free[np.arange(len(lost)) % len(free)]
     return np.asarray(colors)
+
+
+def _lines_on(faces: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return black, or grey where black is not seen, for the lines on quads of these colours, shape (n, 3)."""
+    is_dark = (faces * LUMA).sum(axis=1) < DARK
+    return np.where(is_dark[:, None], 0.55, 0.0) * np.ones(3)
 
 
 def _differences(some: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.int64]:
