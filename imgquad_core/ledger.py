@@ -91,15 +91,16 @@ def material_ledger(
     pixels_in_square = clean.labels.size / (boundary.shape[0] * boundary.shape[1])
     enclosed = enclosed_areas(boundary) * pixels_in_square
     meshed = region_areas(mesh) / (pixel_sides[0] * pixel_sides[1])
+    left = clean.pixels
     rows = []
-    for label in np.unique(picture.labels[picture.labels != VOID]):
-        pixels = int(np.count_nonzero(clean.labels == label))
+    for label, before in picture.pixels.items():
+        pixels = left.get(label, 0)
         area = float(meshed[mesh.region_label == label].sum())
         rows.append(
             MaterialAccount(
-                material=int(label),
-                name=picture.materials.name_of(int(label)),
-                pixels=int(np.count_nonzero(picture.labels == label)),
+                material=label,
+                name=picture.materials.name_of(label),
+                pixels=before,
                 clean_pixels=pixels,
                 boundary_area=float(enclosed[boundary.region_label == label].sum()),
                 mesh_area=area,

@@ -9,9 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Bytes, Floats, Ints, Labels, Value
 
@@ -83,6 +84,22 @@ class LabelImage(Value):
     def shape(self) -> tuple[int, int]:
         """(n_rows, n_cols)."""
         return self.labels.shape[0], self.labels.shape[1]
+
+    @property
+    def pixels(self) -> dict[int, int]:
+        """Number of pixels of each material that occurs, ascending by the material's number."""
+        numbers, counts = _counted(self.labels)
+        return {int(n): int(count) for n, count in zip(numbers, counts, strict=True) if n != VOID}
+
+
+def _counted(labels: Labels) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the numbers that occur, ascending, and how often each does: by sorting only where they lie far apart."""
+    low, high = (int(labels.min()), int(labels.max())) if labels.size else (0, 0)
+    if high - low > 1 << 20:
+        return np.unique(labels, return_counts=True)
+    counts = np.bincount((labels - low).ravel())
+    present = np.flatnonzero(counts)
+    return present + low, counts[present]
 
 
 class Chains(NamedTuple):

@@ -223,6 +223,7 @@ def run(
         step = made("step", step_of, picture, options.step, options.policy)
         noise = options.noise(found.quantised, found.image.shape).scaled(step)
         clean = made("clean", remove_noise, picture, noise)
+        removed = made("removed", list_removed, picture, clean, noise.policy, noise.step)
     with timed("absorb"):
         absorbed = made("absorbed", absorb_thin, clean, options.absorbing(picture.materials, noise.step))
     labels = made("labels", drop_materials, absorbed.image, options.drop)
@@ -243,7 +244,7 @@ def run(
         picture=picture,
         step=(step[0] / absorbed.times, step[1] / absorbed.times),
         noise=noise,
-        removed=list_removed(picture, clean, noise.policy, noise.step),
+        removed=removed,
         clean=clean,
         absorbed=absorbed.materials,
         labels=labels,

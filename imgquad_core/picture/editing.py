@@ -9,7 +9,7 @@ import numpy as np
 
 from imgquad_core.arrays import Floats
 from imgquad_core.errors import InputError
-from imgquad_core.model import VOID, LabelImage, Materials
+from imgquad_core.model import LabelImage, Materials
 
 from .options import EditOptions
 from .selection import material_number
@@ -141,6 +141,5 @@ def recolor_materials(image: LabelImage, colors: Mapping[Name, RGB]) -> LabelIma
 
 def area_shares(image: LabelImage) -> dict[int, float]:
     """Return the share of the picture that each material fills, 0 to 1, by number."""
-    counts = dict(zip(*(part.tolist() for part in np.unique(image.labels, return_counts=True)), strict=True))
-    counts.pop(VOID, None)
+    counts = image.pixels
     return {number: counts.get(number, 0) / image.labels.size for number in image.materials.labels.tolist()}

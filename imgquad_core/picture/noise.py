@@ -103,7 +103,7 @@ def remove_noise(image: LabelImage, options: DenoiseOptions | None = None) -> La
     options = options or DenoiseOptions()
     if not options.removes or image.labels.size == 0:
         return image
-    values, colors = _ranked(image.labels)
+    values, colors = _ranked(image)
     while _remove_once(colors, len(values), options):
         pass
     return LabelImage(_unranked(values, colors), image.materials)
@@ -131,7 +131,7 @@ def list_removed(
     if before.labels is after.labels:
         return ()
     changed = (before.labels != after.labels).ravel()
-    root = labelled_clusters(_ranked(before.labels)[1], corner_rule(policy, step)).parent
+    root = labelled_clusters(_ranked(before)[1], corner_rule(policy, step)).parent
     while (root != root[root]).any():
         root = root[root]
     lost = before.labels.ravel()[changed]
@@ -162,22 +162,14 @@ class Scratch(NamedTuple):
     largest: Ints  #: by colour: pixels of the largest neighbour
 
 
-def _ranked(labels: Labels) -> tuple[Labels, Labels]:
+def _ranked(image: LabelImage) -> tuple[Labels, Labels]:
     """Return the materials that occur, and colours 0, 1, ... in their place (`VOID` stays)."""
-    values = _occurring(labels)
-    values = values[values != VOID]
+    values = np.array(list(image.pixels), np.int32)
     if len(values) and values[-1] == len(values) - 1:
-        return values, labels.copy()
-    colors = np.searchsorted(values, labels).astype(np.int32)
-    colors[labels == VOID] = VOID
+        return values, image.labels.copy()
+    colors = np.searchsorted(values, image.labels).astype(np.int32)
+    colors[image.labels == VOID] = VOID
     return values, colors
-
-
-def _occurring(labels: Labels) -> Labels:
-    low, high = (int(labels.min()), int(labels.max())) if labels.size else (0, 0)
-    if high - low > 1 << 20:
-        return np.unique(labels)
-    return (np.flatnonzero(np.bincount(labels.ravel() - low)) + low).astype(np.int32)
 
 
 def _unranked(values: Labels, colors: Labels) -> Labels:

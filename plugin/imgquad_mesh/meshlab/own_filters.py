@@ -174,8 +174,7 @@ def _pixel_boundary(state: State) -> BoundaryGraph:
 
 
 def _label_counts(image: LabelImage) -> dict[str, Any]:
-    numbers, counts = np.unique(image.labels, return_counts=True)
-    pixels = {image.materials.name_of(int(n)): int(c) for n, c in zip(numbers, counts, strict=True) if n >= 0}
+    pixels = {image.materials.name_of(number): count for number, count in image.pixels.items()}
     return {"materials_number": len(pixels), "pixels": pixels}
 
 

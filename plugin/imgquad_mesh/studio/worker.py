@@ -29,7 +29,7 @@ from imgquad_core.measures import quality_report
 from imgquad_core.measures.quality import bad_places
 from imgquad_core.model import LabelImage, Materials
 from imgquad_core.options import MeshOptions
-from imgquad_core.picture import Segmentation, SegmentationOptions, area_shares, list_removed
+from imgquad_core.picture import Segmentation, SegmentationOptions, area_shares
 from imgquad_core.pipeline import STAGES, Memory, Run, run
 from imgquad_core.reading import Picture, ReadOptions, read_picture
 from imgquad_core.reading.formats import OF_VTK
@@ -193,9 +193,8 @@ def _table(image: LabelImage) -> list[dict[str, Any]]:
 def _denoise(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     _run(desk, task, tell, "denoise")
     recipe, clean, found = recipe_of(task["recipe"]), desk.memory["clean"], desk.memory["segmentation"]
-    before = desk.memory["picture"] if recipe.options.crop else desk.memory["edited"]
     limits = recipe.options.noise(found.quantised, found.image.shape).scaled(desk.memory["step"])
-    removed = list_removed(before, clean, limits.policy, limits.step)
+    removed = desk.memory["removed"]
     listed, data = packing.packed({"labels": packing.label_places(clean.labels, clean.materials)})
     told = {"min_pixels": limits.min_pixels, "min_length": limits.min_length, "rows": clean.shape[0]}
     told |= {"clusters": sum(r.clusters for r in removed), "pixels": sum(r.pixels for r in removed)}

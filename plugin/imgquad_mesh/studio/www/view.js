@@ -3,12 +3,16 @@
 const BLOCK = 2048; // quads that are drawn, or left out, together
 const SLOW = 25; // ms of a drawing from which moves show the last one shifted
 const REST = 140; // ms after the last move when it is drawn anew
+const WIDE = 4096; // texels in a row of a table
 const VOID = [0, 0, 0, 0];
 
+// Lines and quads are tables of four numbers in textures, fetched by the number of the vertex, six a line and four a quad:
+// instances would be simpler, but without a graphics card each one costs as much as a drawing (332,000 quads: minutes).
 const CAMERA = `#version 300 es
-precision highp float; precision highp int; precision highp usampler2D;
+precision highp float; precision highp int; precision highp sampler2D; precision highp usampler2D;
 uniform vec4 camera; // centre, and clip units a pixel of the picture
-vec4 seen(vec2 p) { return vec4((p - camera.xy) * vec2(camera.z, -camera.w), 0., 1.); }`;
+vec4 seen(vec2 p) { return vec4((p - camera.xy) * vec2(camera.z, -camera.w), 0., 1.); }
+vec4 entry(sampler2D table, int k) { return texelFetch(table, ivec2(k % ${WIDE}, k / ${WIDE}), 0); }`;
 const PICTURE = {
   vertex: `${CAMERA} uniform vec4 rect; out vec2 at;
     void main() { at = rect.xy + rect.zw * vec2(gl_VertexID & 1, gl_VertexID >> 1); gl_Position = seen(at); }`,
@@ -34,12 +38,14 @@ const PICTURE = {
     }`,
 };
 const LINES = {
-  vertex: `${CAMERA} layout(location=0) in vec4 ends; uniform vec2 screen; uniform float width;
+  vertex: `${CAMERA} uniform sampler2D table; uniform vec2 screen; uniform float width;
     void main() {
+      vec4 ends = entry(table, gl_VertexID / 6);
+      int corner = gl_VertexID % 6;
       vec2 a = seen(ends.xy).xy * screen, b = seen(ends.zw).xy * screen, along = b - a;
       along /= max(length(along), 1e-6);
       vec2 side = vec2(-along.y, along.x) * width;
-      bool far = gl_VertexID == 1 || gl_VertexID == 2 || gl_VertexID == 4, up = gl_VertexID == 2 || gl_VertexID > 3;
+      bool far = corner == 1 || corner == 2 || corner == 4, up = corner == 2 || corner > 3;
       vec2 p = (far ? b + along * width * .5 : a - along * width * .5) + (up ? side : -side);
       gl_Position = vec4(p / screen, 0, 1);
     }`,
@@ -47,9 +53,8 @@ const LINES = {
     precision highp float; uniform vec4 ink; out vec4 color; void main() { color = ink; }`,
 };
 const QUADS = {
-  vertex: `${CAMERA} layout(location=0) in vec4 front; layout(location=1) in vec4 back;
-    layout(location=2) in float jacobian; layout(location=3) in float place;
-    uniform sampler2D palette; uniform bool shaded; uniform vec2 range;
+  // table: corners in two entries a quad; traits: scaled Jacobian and place in the palette
+  vertex: `${CAMERA} uniform sampler2D table, traits, palette; uniform bool shaded; uniform vec2 range;
     out vec2 uv; flat out vec3 fill;
     vec3 ramp(float t) { // Brewer's RdYlBu: told apart by colour-blind eyes, too
       vec3 stops[5] = vec3[5](vec3(.843,.188,.153), vec3(.988,.553,.349), vec3(.996,.878,.565), vec3(.569,.749,.859), vec3(.271,.459,.706));
@@ -57,10 +62,12 @@ const QUADS = {
       return mix(stops[k], stops[k + 1], fract(s));
     }
     void main() {
-      int k = gl_VertexID < 3 ? gl_VertexID : (gl_VertexID == 3 ? 0 : gl_VertexID - 2);
-      gl_Position = seen(k == 0 ? front.xy : k == 1 ? front.zw : k == 2 ? back.xy : back.zw);
+      int quad = gl_VertexID / 4, k = gl_VertexID % 4;
+      vec4 two = entry(table, 2 * quad + k / 2);
+      gl_Position = seen(k % 2 == 0 ? two.xy : two.zw);
+      float jacobian = entry(traits, quad).x; int place = int(entry(traits, quad).y);
       uv = vec2(k == 1 || k == 2, k > 1);
-      fill = shaded ? ramp(jacobian) : texelFetch(palette, ivec2(int(place) & 255, int(place) >> 8), 0).rgb;
+      fill = shaded ? ramp(jacobian) : texelFetch(palette, ivec2(place & 255, place >> 8), 0).rgb;
       if (jacobian < range.x || jacobian > range.y) fill = mix(fill, vec3(.5), .85);
     }`,
   fragment: `#version 300 es
@@ -76,7 +83,7 @@ const QUADS = {
 export class View {
   constructor(canvas) {
     this.canvas = canvas;
-    const gl = (this.gl = canvas.getContext("webgl2", { antialias: true, alpha: false, preserveDrawingBuffer: true }));
+    const gl = (this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false, preserveDrawingBuffer: true }));
     if (!gl) throw new Error("this browser has no WebGL 2: update it, or allow it hardware acceleration. Files can be made all the same");
     this.programs = { picture: program(gl, PICTURE), lines: program(gl, LINES), quads: program(gl, QUADS) };
     this.textures = {};
@@ -90,11 +97,12 @@ export class View {
     this.opacity = 0.6;
     this.split = 0;
     this.shaded = false;
+    this.fitted = false;
     this.range = [-9, 9];
     this.cost = 0;
     this.frames = 0;
     this.listeners = [];
-    new ResizeObserver(() => this.draw()).observe(canvas.parentElement);
+    new ResizeObserver(() => (this.fitted && this.fit(), this.draw())).observe(canvas.parentElement);
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => location.reload());
   }
@@ -125,7 +133,7 @@ export class View {
     drawn.getContext("2d").drawImage(image, 0, 0, drawn.width, drawn.height);
     this._put("picture", this._texture(gl.RGBA8, drawn.width, drawn.height, gl.RGBA, gl.UNSIGNED_BYTE, drawn.getContext("2d").getImageData(0, 0, drawn.width, drawn.height)));
     this.size = size;
-    for (const name of ["lines", "quads", "mark"]) this[name] = null;
+    for (const name of ["lines", "quads", "mark"]) this[name] = void this._drop(this[name]);
     this.labels = { before: null, after: null };
     this.part = null;
   }
@@ -146,20 +154,37 @@ export class View {
   }
 
   setLines(lines) {
-    this.lines = { buffer: this._buffer(lines), n: lines.length / 4 };
+    this._drop(this.lines);
+    this.lines = { table: this._table(lines), n: lines.length / 4 };
   }
 
   setQuads({ corners, jacobians, places, quads }) {
-    if (this.quads) for (const name of ["corners", "jacobians", "places"]) this.gl.deleteBuffer(this.quads.buffers[name]);
-    const buffers = { corners: this._buffer(corners), jacobians: this._buffer(jacobians), places: this._buffer(places) };
-    this.quads = { buffers, corners, jacobians, places, quads, n: quads.length, boxes: boxesOf(corners) };
+    this._drop(this.quads);
+    const traits = new Float32Array(2 * quads.length);
+    for (let q = 0; q < quads.length; q++) [traits[2 * q], traits[2 * q + 1]] = [jacobians[q], places[q]];
+    const tables = { table: this._table(corners), traits: this._table(traits, 2), halves: this._halves(quads.length) };
+    this.quads = { ...tables, corners, quads, n: quads.length, boxes: boxesOf(corners) };
   }
 
-  _buffer(data) {
-    const gl = this.gl, made = gl.createBuffer();
-    gl.bindBuffer(gl.ARRAY_BUFFER, made);
-    gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
+  // A texture whose texels are the entries of an array, in rows of WIDE.
+  _table(data, parts = 4) {
+    const gl = this.gl, rows = Math.max(1, Math.ceil(data.length / parts / WIDE)), whole = new Float32Array(parts * WIDE * rows);
+    whole.set(data);
+    return this._texture(parts === 4 ? gl.RGBA32F : gl.RG32F, WIDE, rows, parts === 4 ? gl.RGBA : gl.RG, gl.FLOAT, whole);
+  }
+
+  // The two triangles of each quad.
+  _halves(n) {
+    const gl = this.gl, made = gl.createBuffer(), corners = new Uint32Array(6 * n);
+    for (let q = 0; q < n; q++) [0, 1, 2, 0, 2, 3].forEach((k, at) => (corners[6 * q + at] = 4 * q + k));
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, made);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
     return made;
+  }
+
+  _drop(drawn) {
+    for (const name of ["table", "traits"]) this.gl.deleteTexture(drawn?.[name] ?? null);
+    this.gl.deleteBuffer(drawn?.halves ?? null);
   }
 
   // Camera
@@ -168,11 +193,13 @@ export class View {
     const { width, height } = this._resized();
     const scale = 0.96 * Math.min(width / this.size[0], height / this.size[1]);
     this.look({ x: this.size[0] / 2, y: this.size[1] / 2, scale });
+    this.fitted = true; // until it is moved, and so at another size of the window
   }
 
   look(camera) {
     const least = 0.2 * Math.min(this.canvas.width / this.size[0], this.canvas.height / this.size[1]);
     const within = (value, most) => Math.min(Math.max(value, 0), most);
+    this.fitted = false;
     this.camera = { x: within(camera.x, this.size[0]), y: within(camera.y, this.size[1]), scale: Math.min(Math.max(camera.scale, least), 200) };
     this.moved();
   }
@@ -240,7 +267,7 @@ export class View {
     gl.clear(gl.COLOR_BUFFER_BIT);
     if (this.shown.picture) this._drawPicture();
     if (this.shown.quads && this.quads) this._drawQuads();
-    if (this.shown.lines && this.lines) this._drawLines(this.lines, 1.1 * this.ratio, [0.85, 0.1, 0.35, 1]);
+    if (this.shown.lines && this.lines) this._drawLines(this.lines, 1.5 * this.ratio, [0.85, 0.1, 0.35, 1]);
     if (this.shown.quads && this.mark) for (const [width, ink] of [[4, [1, 1, 1, 1]], [2, [0.8, 0, 0.5, 1]]]) this._drawLines(this.mark, width * this.ratio, ink);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits, so that the time is the drawing's
     this.cost = performance.now() - start;
@@ -258,51 +285,39 @@ export class View {
 
   _drawPicture() {
     const gl = this.gl, places = this._use(this.programs.picture), whole = [0, 0, ...this.size];
-    ["picture", "palette", "before", "after"].forEach((name, unit) => {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, this.textures[name]);
-      gl.uniform1i(places[name], unit);
-    });
+    this._give(places, this.textures);
     gl.uniform4f(places.rect, ...whole);
     gl.uniform4f(places.part, ...(this.part ?? whole));
     gl.uniform1f(places.opacity, this.labels.before ? this.opacity : 0);
     gl.uniform1f(places.split, this.labels.after ? this.split * this.canvas.width : 1e9);
-    gl.disableVertexAttribArray(0);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  _drawLines({ buffer, n }, width, ink) {
+  _drawLines({ table, n }, width, ink) {
     const gl = this.gl, places = this._use(this.programs.lines);
+    this._give(places, { table });
     gl.uniform2f(places.screen, this.canvas.width / 2, this.canvas.height / 2);
     gl.uniform1f(places.width, width / 2);
     gl.uniform4f(places.ink, ...ink);
-    this._attribute(0, buffer, 4, 16, 0);
-    for (const k of [1, 2, 3]) gl.disableVertexAttribArray(k);
-    gl.drawArraysInstanced(gl.TRIANGLES, 0, 6, n);
+    gl.drawArrays(gl.TRIANGLES, 0, 6 * n);
   }
 
-  _attribute(place, buffer, size, stride, offset) {
+  _give(places, textures) {
     const gl = this.gl;
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, size, gl.FLOAT, false, stride, offset);
-    gl.vertexAttribDivisor(place, 1);
+    Object.entries(textures).forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(places[name], unit);
+    });
   }
 
   _drawQuads() {
-    const gl = this.gl, places = this._use(this.programs.quads), { buffers } = this.quads;
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.textures.palette);
-    gl.uniform1i(places.palette, 0);
+    const gl = this.gl, places = this._use(this.programs.quads), { table, traits } = this.quads;
+    this._give(places, { table, traits, palette: this.textures.palette });
     gl.uniform1i(places.shaded, this.shaded ? 1 : 0);
     gl.uniform2f(places.range, ...this.range);
-    for (const [first, n] of this._runsInView()) {
-      this._attribute(0, buffers.corners, 4, 32, 32 * first);
-      this._attribute(1, buffers.corners, 4, 32, 32 * first + 16);
-      this._attribute(2, buffers.jacobians, 1, 4, 4 * first);
-      this._attribute(3, buffers.places, 1, 4, 4 * first);
-      gl.drawArraysInstanced(gl.TRIANGLES, 0, 6, n);
-    }
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.quads.halves);
+    for (const [first, n] of this._runsInView()) gl.drawElements(gl.TRIANGLES, 6 * n, gl.UNSIGNED_INT, 24 * first);
   }
 
   // Neighbouring blocks in view, as [first quad, number of quads].
@@ -340,7 +355,8 @@ export class View {
   goTo(q) {
     const c = this.quads.corners.subarray(8 * q, 8 * q + 8);
     const sides = new Float32Array([0, 1, 2, 3].flatMap((k) => [c[2 * k], c[2 * k + 1], c[(2 * k + 2) % 8], c[(2 * k + 3) % 8]]));
-    this.mark = { buffer: this._buffer(sides), n: 4 };
+    this._drop(this.mark);
+    this.mark = { table: this._table(sides), n: 4 };
     const xs = [c[0], c[2], c[4], c[6]], ys = [c[1], c[3], c[5], c[7]];
     const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const scale = Math.min(this.canvas.width, this.canvas.height) / (6 * Math.max(x1 - x0, y1 - y0, 0.05));
