@@ -128,14 +128,14 @@ def test_names_that_cannot_be_shown_are_written_all_the_same(folder: Path) -> No
 WRITING = """
 import sys, time
 from imgquad_mesh.__main__ import main
-from imgquad_mesh.outputs import files
+from imgquad_mesh import outputs
 
 def write_half(dataset, path):
     path.write_text("half")
     print("writing", flush=True)
     time.sleep(60)
 
-files.save_dataset = write_half
+outputs.save_dataset = write_half
 sys.exit(main(["run", "rock.png", "rock.vtu", "--quiet"]))
 """
 

@@ -294,7 +294,7 @@ def _row_in(path: Path, key: str) -> dict[str, Any] | None:
 
 def _meshed(which: Slice, plane: Any, look: Look, rules: Rules, z: float, path: Path, key: str) -> dict[str, Any]:
     from imgquad_mesh.datasets.grids import to_grid
-    from imgquad_mesh.outputs.files import save_dataset
+    from imgquad_mesh.outputs import save_dataset
     from imgquad_mesh.outputs.report import build_report
 
     start = perf_counter()

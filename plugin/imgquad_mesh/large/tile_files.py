@@ -35,7 +35,7 @@ def _save_piece(job: Job, t: int, found: dict[str, Any], counts: Sequence[tuple[
     import pyvista as pv
 
     from imgquad_mesh.datasets.fields import put_materials
-    from imgquad_mesh.outputs.files import save_dataset
+    from imgquad_mesh.outputs import save_dataset
 
     grid = pv.UnstructuredGrid({pv.CellType.QUAD: found["quads"]}, _placed(job, found["points"]))
     for name, values in _cell_arrays(t, found).items():

@@ -14,6 +14,7 @@ from .files import (
 from .mesh_picture import draw_materials, material_colors
 from .report import build_report, element_notes
 from .rock_picture import draw_rock, rock_labels
+from .vtk_files import save_dataset, save_legacy, save_with_comment
 
 __all__ = [
     "GRID_EXTENSIONS",
@@ -27,6 +28,9 @@ __all__ = [
     "mesh_extensions",
     "replace_file",
     "rock_labels",
+    "save_dataset",
+    "save_legacy",
+    "save_with_comment",
     "write_boundaries",
     "write_json",
     "write_labels",

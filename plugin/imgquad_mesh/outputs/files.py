@@ -7,28 +7,19 @@ import tempfile
 from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
-from time import time
 from typing import Any
 
 import numpy as np
 from PIL import Image
-from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
-from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 import imgquad_core as core
 from imgquad_core.errors import InputError
-from imgquad_core.whole_files import assert_apart, real_target, replacing, take_room
-from imgquad_core.writers.hdf5_times import erase_times
+from imgquad_core.whole_files import assert_apart, real_target, replacing
 from imgquad_core.writers.neighbours import check_neighbours, files_of
-from imgquad_mesh import datasets, outputs  # `outputs`: matplotlib is loaded with the first drawing
+from imgquad_mesh import datasets, outputs  # `outputs`: VTK and matplotlib are loaded with what needs them
 
 #: formats that PyVista writes
 GRID_EXTENSIONS = (".vtu", ".vtk", ".vtkhdf")
-LEGACY_TITLE = 250  #: signs; VTK takes 256 with the end of the line
-
-#: zlib's level: a third of the time of VTK's 5, 2 % longer; meshio reads neither LZ4 nor bytes that are not in base64
-FAST = 1
-HDF_CHUNK = 25_000  #: values, in which VTK's HDF5 writer makes files longer
 
 
 def check_target(path: Path, extensions: tuple[str, ...]) -> None:
@@ -95,7 +86,7 @@ def write_mesh_file(
         if complete:
             complete(grid)
         saved = datasets.for_vtu(grid) if is_vtu else grid
-        replace_file(path, lambda temporary: save_dataset(saved, temporary))
+        replace_file(path, lambda temporary: outputs.save_dataset(saved, temporary))
     else:
         core.writers.write_mesh(made or mesh, path, **options)
     return made
@@ -106,25 +97,8 @@ def _write_plain(mesh: core.fe.FEMesh, path: Path) -> None:
     grid = datasets.plain_grid(mesh)
     names = core.writers.safe_names([*mesh.material_cells(), *mesh.cohesive_cells()], 255).values()
     legend = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
-    save = _save_legacy if path.suffix.lower() == ".vtk" else _save_with_comment
+    save = outputs.save_legacy if path.suffix.lower() == ".vtk" else outputs.save_with_comment
     replace_file(path, lambda temporary: save(grid, temporary, legend))
-
-
-def _save_legacy(grid: Any, path: Path, title: str) -> None:
-    writer = vtkUnstructuredGridWriter()
-    writer.SetFileVersion(42)  # 5.1 is read by VTK only
-    writer.SetHeader(title[:LEGACY_TITLE])
-    writer.SetInputData(grid)
-    writer.WriteToOutputStringOn()
-    if not writer.Write():
-        raise OSError("VTK cannot format .vtk")
-    path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
-
-
-def _save_with_comment(grid: Any, path: Path, comment: str) -> None:
-    save_dataset(grid, path)
-    head, body = path.read_text(encoding="utf-8").split("\n", 1)
-    path.write_text(f"{head}\n<!-- material: {comment} -->\n{body}", encoding="utf-8", newline="\n")
 
 
 def write_labels(image: core.LabelImage, path: Path) -> None:
@@ -138,7 +112,7 @@ def write_boundaries(run: core.Run, path: Path) -> None:
     materials = np.append(graph.region_label, np.int32(-1))[graph.chain_regions]  # region -1 takes the last one
     points = graph.points * run.square + run.options.corner
     lines = datasets.chain_lines(points, graph.chain_offsets, graph.chain_points, materials, graph.point_kind)
-    replace_file(path, lambda temporary: save_dataset(lines, temporary))
+    replace_file(path, lambda temporary: outputs.save_dataset(lines, temporary))
 
 
 def write_picture(mesh: core.QuadMesh, path: Path) -> None:
@@ -163,31 +137,6 @@ def replace_file(path: Path, write: Callable[[Path], Any]) -> None:
     """
     with replacing(path) as temporary:
         write(temporary)
-
-
-def save_dataset(dataset: Any, path: Path) -> None:
-    """Save a PyVista dataset: Python writes what VTK formats, as VTK's XML writers abort the process on a full disk.
-
-    VTK's HDF5 writer does not tell that a disk is full, so room is made sure of before.
-    """
-    writers = {".vtu": vtkXMLUnstructuredGridWriter, ".vtp": vtkXMLPolyDataWriter}
-    if path.suffix.lower() == ".vtkhdf":
-        arrays = len(dataset.array_names) + 6  # with points, cells
-        take_room(path.parent, 1024 * dataset.GetActualMemorySize() + 8 * HDF_CHUNK * arrays)
-    if path.suffix.lower() not in writers:
-        start = time()
-        with datasets.silent_vtk():
-            dataset.save(path)
-        if path.suffix.lower() == ".vtkhdf":
-            erase_times(path, start, time())
-        return
-    writer = writers[path.suffix.lower()]()
-    writer.SetInputData(dataset)
-    writer.SetCompressionLevel(FAST)
-    writer.WriteToOutputStringOn()
-    if not writer.Write():
-        raise OSError(f"VTK cannot format {path.suffix}")
-    path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")
 
 
 def _save_labels(image: core.LabelImage, path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imgquad_core import MeshOptions, mesh_image
-from imgquad_mesh.outputs import files, mesh_picture  # noqa: F401  (loaded for the workers)
+from imgquad_mesh.outputs import files, mesh_picture  # noqa: F401  (loaded for the workers; VTK is by those that write)
 
 from . import packing, worker  # noqa: F401
 

@@ -178,9 +178,9 @@ def test_a_lost_scheduler_is_told_and_the_next_one_goes_on(files: Path, tmp_path
 def test_a_full_disk_is_told_and_nothing_half_is_left(
     files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from imgquad_mesh.outputs import files as writing
+    from imgquad_mesh import outputs
 
-    save = writing.save_dataset
+    save = outputs.save_dataset
 
     def full(dataset: Any, path: Path) -> None:
         if "0002" in path.name:
@@ -188,7 +188,7 @@ def test_a_full_disk_is_told_and_nothing_half_is_left(
             raise OSError(28, "No space left on device")
         save(dataset, path)
 
-    monkeypatch.setattr(writing, "save_dataset", full)
+    monkeypatch.setattr(outputs, "save_dataset", full)
     made = mesh_stack(files / "*.png", tmp_path / "out.pvd", OPTIONS)
     assert [name for name, _ in made.failed] == ["s10.png"]
     assert "No space left" in made.failed[0][1]
