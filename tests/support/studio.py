@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from urllib.parse import urlsplit
 
 import pytest
@@ -65,11 +65,15 @@ class Studio:
 
 
 @contextmanager
-def running_studio(folder: Path, *options: str) -> Iterator[Studio]:
-    """Start the studio by its command; its temporary files lie in `folder`."""
+def running_studio(folder: Path, *options: str, errors: IO[str] | None = None) -> Iterator[Studio]:
+    """Start the studio by its command; its temporary files lie in `folder`, what it complains of goes to `errors`."""
     command = [sys.executable, "-m", "imgquad_mesh", "studio", "--no-browser", *options]
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "TMPDIR": str(folder), "PYTHONUNBUFFERED": "1"}
+        command,
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        text=True,
+        env={**os.environ, "TMPDIR": str(folder), "PYTHONUNBUFFERED": "1"},
     )
     try:
         assert process.stdout is not None

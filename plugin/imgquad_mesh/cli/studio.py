@@ -35,9 +35,7 @@ def add_parser(subparsers: Any) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Serve until interrupted; return the exit code."""
     try:
-        import uvicorn
-
-        from imgquad_mesh.studio.server import Place, make_app
+        from imgquad_mesh.studio.server import Place, serve
         from imgquad_mesh.studio.sessions import Limits
     except ImportError as error:
         raise InputError(f"the studio needs {error.name}: pip install 'imgquad-mesh[studio]'") from error
@@ -60,9 +58,7 @@ def execute(args: argparse.Namespace) -> int:
         print(f"the studio is at {place.address} (Ctrl-C ends it)", flush=True)
         if not args.no_browser:
             webbrowser.open(place.address)
-        app = make_app(place, limits, args.picture)
-        settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, limit_concurrency=64)
-        uvicorn.Server(settings).run(sockets=[listening])
+        serve(place, limits, args.picture, listening)
     return 0
 
 

@@ -14,6 +14,7 @@ from imgquad_core.model import BoundaryGraph, LabelImage, Materials, QuadMesh
 
 Arrays = Mapping[str, NDArray[Any]]
 LARGEST = 4096  #: side of a texture that every WebGL 2 has
+MOST_ENTRIES = 1 << 20  #: of a table by the number of the material
 
 
 def packed(arrays: Arrays) -> tuple[list[dict[str, Any]], bytes]:
@@ -30,9 +31,13 @@ def label_places(labels: Labels, materials: Materials) -> NDArray[Any]:
     """Return each pixel's place in the table of materials (the number behind the last: void), shrunk to a texture."""
     step = -(-max(labels.shape) // LARGEST)
     shown = labels[::step, ::step]
-    places = np.searchsorted(materials.labels, shown)
-    places = np.where(shown < 0, len(materials.labels), places)
-    return places.astype(np.uint8 if len(materials.labels) < 255 else np.uint16)
+    n, highest = len(materials.labels), int(materials.labels.max(initial=0))
+    kind = np.uint8 if n < 255 else np.uint16
+    if highest > MOST_ENTRIES:
+        return np.where(shown < 0, n, np.searchsorted(materials.labels, shown)).astype(kind)
+    places = np.full(highest + 2, n, kind)
+    places[materials.labels] = np.arange(n)
+    return np.asarray(places[shown])  # void, -1, is the last entry
 
 
 def material_rows(image: LabelImage, shares: Mapping[int, float], colors: Floats) -> list[dict[str, Any]]:

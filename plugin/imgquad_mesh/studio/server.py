@@ -6,6 +6,7 @@ import asyncio
 import json
 import re
 import secrets
+import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import uvicorn
 from starlette.applications import Starlette
 from starlette.datastructures import MutableHeaders
 from starlette.requests import ClientDisconnect, Request
@@ -147,19 +149,18 @@ async def _save(request: Request, path: Path, limits: Limits) -> None:
         raise
 
 
-def make_app(place: Place, limits: Limits | None = None, picture: Path | None = None) -> ASGIApp:
+def make_app(place: Place, sessions: Sessions, picture: Path | None = None) -> ASGIApp:
     """Return the studio as an ASGI application.
 
     Parameters
     ----------
     place : Place
         Where it is served.
-    limits : Limits, optional
-        What pages may use.
+    sessions : Sessions
+        What pages have, and may use.
     picture : Path, optional
         A picture to open at the start.
     """
-    sessions = Sessions(limits or Limits())
     files = {path.name: path.read_bytes() for path in WWW.iterdir() if path.suffix in TYPES}
 
     async def page(request: Request) -> Response:
@@ -230,6 +231,24 @@ def make_app(place: Place, limits: Limits | None = None, picture: Path | None = 
     routes = [Route("/", page), Route("/{name}", static)]
     routes += [Route(path, _told(answer), methods=["POST"]) for path, answer in {**posts, "/close": close}.items()]
     return Guard(Starlette(routes=routes, lifespan=lifespan), place)
+
+
+class _Server(uvicorn.Server):
+    """Ends the work before it waits for the answers that are under way: they end with it."""
+
+    def __init__(self, app: ASGIApp, sessions: Sessions) -> None:
+        super().__init__(uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, limit_concurrency=64))
+        self._sessions = sessions
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._sessions.end()
+        await super().shutdown(sockets)
+
+
+def serve(place: Place, limits: Limits, picture: Path | None, listening: socket.socket) -> None:
+    """Serve the studio on a socket until it is interrupted."""
+    sessions = Sessions(limits)
+    _Server(make_app(place, sessions, picture), sessions).run(sockets=[listening])
 
 
 Answering = Callable[[Request], Awaitable[Response]]

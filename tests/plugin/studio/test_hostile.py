@@ -5,12 +5,14 @@ from __future__ import annotations
 import io
 import json
 import pickle
+import signal
 import socket
 import struct
 import time
 import zipfile
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -213,6 +215,23 @@ def test_nothing_stays_when_the_studio_ends(tmp_path: Path) -> None:
         started.ask("POST", "/picture?name=a.png", png())
         assert list(tmp_path.glob("imgquad-studio-*/*/upload*"))
     assert list(tmp_path.glob("imgquad-studio-*")) == []
+
+
+def test_an_interruption_ends_the_work_and_says_one_line(tmp_path: Path) -> None:
+    out = io.BytesIO()
+    Image.fromarray(np.random.default_rng(1).integers(0, 4, (700, 700), np.uint8)).save(out, "PNG")
+    task = {"do": "mesh", "recipe": {"picture": "a.png", "options": {"min_pixels": 0}}}
+    with (tmp_path / "errors").open("w+") as errors, running_studio(tmp_path, errors=errors) as started:
+        started.ask("POST", "/picture?name=a.png", out.getvalue())
+        started.do({**task, "do": "segment"})  # the worker has begun
+        with ThreadPoolExecutor() as beside:
+            answer = beside.submit(started.do, task)
+            time.sleep(1.0)
+            started.process.send_signal(signal.SIGINT)
+            started.process.wait(20)
+            assert "error" in answer.result()[-1], "the page hears of it"
+        errors.seek(0)
+        assert errors.read() == "imgquad-mesh: error: interrupted\n"
 
 
 def test_the_server_loads_no_pictures_and_no_viewer() -> None:

@@ -5,7 +5,7 @@ import { forget, h, refresh } from "./fields.js";
 import { drawStrokes, strokesAsPng } from "./marks.js";
 import * as panels from "./panels.js";
 import { canRedo, canUndo, change, current, onChange, recipe, redo, restart, settle, undo } from "./state.js";
-import { View } from "./view.js";
+import { LARGEST, View } from "./view.js";
 
 const at = (id) => document.getElementById(id);
 // name, panel, the stage that it shows, what is seen
@@ -25,11 +25,10 @@ async function open(blob, name) {
   running?.abort();
   try {
     const [decoded, sent] = await Promise.all([decode(blob), api.sendPicture(blob, name)]);
-    picture = { name: sent.name, decoded: Boolean(decoded) };
+    picture = { name: sent.name, decoded };
     Object.assign(app, { results: {}, brush: 0 });
     [failed, sentMarks, looked] = [{}, null, null];
     restart();
-    if (decoded) showPicture(decoded, [decoded.width, decoded.height]);
     at("drop").hidden = true;
     at("bar").hidden = false;
     at("name").textContent = picture.name;
@@ -40,15 +39,18 @@ async function open(blob, name) {
   }
 }
 
-// The browser shows what it can read itself at once; null for other formats, which the server draws.
+// The browser shows what it can read itself at once, and says whether it can; the server draws other formats.
 async function decode(blob) {
   try {
-    const image = await createImageBitmap(blob);
-    if (!picture) at("drop").hidden = true;
-    showPicture(image, [image.width, image.height]);
-    return image;
+    const asIs = { premultiplyAlpha: "none", colorSpaceConversion: "none" };
+    const image = await createImageBitmap(blob, asIs), { width, height } = image;
+    const by = LARGEST / Math.max(width, height), sides = { resizeWidth: Math.max(1, width * by), resizeHeight: Math.max(1, height * by) };
+    const shown = by < 1 ? await createImageBitmap(image, { ...asIs, ...sides }) : image; // quick: shrunk by the decoder
+    at("drop").hidden = true;
+    showPicture(shown, [width, height]);
+    return true;
   } catch {
-    return null;
+    return false;
   }
 }
 

@@ -4,6 +4,7 @@ const BLOCK = 2048; // quads that are drawn, or left out, together
 const SLOW = 25; // ms of a drawing from which moves show the last one shifted
 const REST = 140; // ms after the last move when it is drawn anew
 const WIDE = 4096; // texels in a row of a table
+export const LARGEST = 4096; // side of a picture that is shown, as in packing.py
 const VOID = [0, 0, 0, 0];
 
 // Lines and quads are tables of four numbers in textures, fetched by the number of the vertex, six a line and four a quad:
@@ -125,13 +126,10 @@ export class View {
     this.textures[name] = texture;
   }
 
-  // An image that the browser has decoded; `size` is that of the picture, where the image is a smaller one of it.
+  // An image that the browser has decoded, of sides of LARGEST at most; `size` is that of the picture.
   setPicture(image, size) {
-    const gl = this.gl, most = Math.min(gl.getParameter(gl.MAX_TEXTURE_SIZE), 4096);
-    const shrink = Math.min(1, most / Math.max(image.width, image.height));
-    const drawn = new OffscreenCanvas(Math.max(1, image.width * shrink), Math.max(1, image.height * shrink));
-    drawn.getContext("2d").drawImage(image, 0, 0, drawn.width, drawn.height);
-    this._put("picture", this._texture(gl.RGBA8, drawn.width, drawn.height, gl.RGBA, gl.UNSIGNED_BYTE, drawn.getContext("2d").getImageData(0, 0, drawn.width, drawn.height)));
+    const gl = this.gl;
+    this._put("picture", this._texture(gl.RGBA8, image.width, image.height, gl.RGBA, gl.UNSIGNED_BYTE, image));
     this.size = size;
     for (const name of ["lines", "quads", "mark"]) this[name] = void this._drop(this[name]);
     this.labels = { before: null, after: null };
