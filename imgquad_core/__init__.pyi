@@ -1,4 +1,4 @@
-from . import boundary, cleanup, declared, fe, geometry, measures, mesher, picture, pipeline, tracing, writers
+from . import boundary, cleanup, declared, fe, geometry, measures, mesher, picture, pipeline, remedies, tracing, writers
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .options import MeshOptions
 from .pipeline import Run, mesh_image, run
@@ -20,6 +20,7 @@ __all__ = [
     "mesher",
     "picture",
     "pipeline",
+    "remedies",
     "run",
     "tracing",
     "writers",

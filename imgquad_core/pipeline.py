@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,6 @@ from .picture import (
     list_removed,
     remove_noise,
     segment_picture,
-    sizes_by_number,
-    widest_part,
 )
 from .reading import Calibration, Picture, ReadOptions, picture_of, read_picture, size_note
 
@@ -64,13 +62,6 @@ Progress: TypeAlias = Callable[[str, int, int], None]
 STAGES = ("read", "segment", "denoise", "absorb", "boundary", "smooth", "mesh")
 MOST_QUADS = 200_000_000  #: more are refused before memory is
 _MATCHES = 8  # rounds in which opposite sides of a periodic cell are cut alike
-MUCH, MATTERS = 0.5, 0.01  #: share of a material that is lost, and of the picture that it had, from which it is told
-_REMEDIES = "remove noise (min-pixels, min-length), ask for a smaller size or raise the tolerance"
-_FIRST_REMEDY = (
-    "remove noise (min-pixels, min-length), ask for a smaller size, set tolerance {:g} (half the size), which gives "
-    "what is thinner to its neighbours"
-)
-MANY_TIMES, MANY_QUADS = 4.0, 1000  #: quads over area / size^2, and in all, from which thin features are told
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,17 +199,8 @@ def run(
         Of former runs, whose values are taken where they are the same.
     """
     made = Memory() if memory is None else memory
-    options = MeshOptions() if options is None else options
-    if not isinstance(options, MeshOptions):
-        raise InputError(f"options is {options!r}: give a MeshOptions")
     timed = _Stopwatch(progress)
-    raw = source if isinstance(source, Segmentation) else _read(source, options, timed)
-    found = raw if isinstance(raw, Segmentation) else _segmented(raw, options, timed, made)
-    crop = None if isinstance(raw, Picture) and raw.window else options.crop  # what was read may be the part already
-    edited = made("edited", edit_materials, found.image, options.editing())
-    picture = made("picture", crop_image, edited, crop) if crop else edited
-    calibration, notes = _what_the_file_says(raw, crop, options)
-    options = options.placed(calibration, raw.name if isinstance(raw, Picture) else "the picture")
+    found, picture, options, calibration, notes = _begun(source, options, timed, made)
     with timed("denoise"):
         step = made("step", step_of, picture, options.step, options.policy)
         noise = options.noise(found.quantised, found.image.shape).scaled(step)
@@ -227,8 +209,8 @@ def run(
     with timed("absorb"):
         absorbed = made("absorbed", absorb_thin, clean, options.absorbing(picture.materials, noise.step))
     labels = made("labels", drop_materials, absorbed.image, options.drop)
-    step = step[0] * absorbed.times, step[1] * absorbed.times
-    smoothing, meshing = options.smoothing(picture.materials, step), options.meshing(picture.materials)
+    smoothing = options.smoothing(picture.materials, (step[0] * absorbed.times, step[1] * absorbed.times))
+    meshing = options.meshing(picture.materials)
     true = true_shape(labels.shape, options.pixel_sides)
     _assert_feasible(true.shape, smoothing.size)
     with timed("boundary"):
@@ -242,7 +224,7 @@ def run(
         options=options,
         segmentation=found,
         picture=picture,
-        step=(step[0] / absorbed.times, step[1] / absorbed.times),
+        step=step,
         noise=noise,
         removed=removed,
         clean=clean,
@@ -347,56 +329,6 @@ def fill_boundaries(
     return boundary, mesh
 
 
-def thin_features(labels: LabelImage, mesh: QuadMesh, options: MeshOptions) -> str | None:
-    """Say how many more quads there are than the sizes asked for would give, with the remedies; None if few.
-
-    Parameters
-    ----------
-    labels : LabelImage
-        The materials as meshed.
-    mesh : QuadMesh
-        Its mesh.
-    options : MeshOptions
-        Sizes in pixels.
-    """
-    sizes = dict.fromkeys(labels.materials.labels.tolist(), options.size)
-    sizes |= sizes_by_number(labels.materials, options.material_sizes)
-    true = true_shape(labels.shape, options.pixel_sides).shape
-    expected = (
-        true[0]
-        * true[1]
-        / labels.labels.size
-        * sum(
-            np.count_nonzero(labels.labels == number) / min(size, options.boundary_size or size) ** 2
-            for number, size in sizes.items()
-        )
-    )
-    if mesh.n_quads <= max(MANY_TIMES * expected, MANY_QUADS):
-        return None
-    return (
-        f"thin features force {mesh.n_quads} quads, {mesh.n_quads / expected:.1f} times area / size^2: "
-        f"{_REMEDIES if options.tolerance else _FIRST_REMEDY.format(0.5 * options.size)}, or drop or merge materials"
-    )
-
-
-def lost_materials(done: Run) -> tuple[str, ...]:
-    """Name the materials that a tolerance took half or more of, or say that it is too wide, with the remedies."""
-    names, n_pixels = done.clean.materials.name_of, done.clean.labels.size
-    if done.absorbed and not any(row.lost for row in done.absorbed) and len(done.pixel_boundary.region_label) > 1:
-        widest = widest_part(done.clean)
-        if widest <= done.options.tolerance:
-            return (
-                f"tolerance {done.options.tolerance:g} px: no part of the picture is that wide (the widest: "
-                f"{widest:.0f} px), so nothing was absorbed; lower the tolerance",
-            )
-    return tuple(
-        f"material {names(row.material)} loses {row.lost / row.pixels:.0%} of its area: it is thinner than "
-        f"{done.options.tolerance:g} px; keep it (keep {names(row.material)}) or lower the tolerance"
-        for row in done.absorbed
-        if row.lost > MUCH * row.pixels and (row.pixels >= MATTERS * n_pixels or row.absorbed == row.regions)
-    )
-
-
 class _Stopwatch:
     """Tells which stage starts, and keeps their times."""
 
@@ -411,6 +343,31 @@ class _Stopwatch:
         start = perf_counter()
         yield
         self.seconds[stage] = perf_counter() - start
+
+
+class _Begun(NamedTuple):
+    """The part of a picture that is meshed, and what its file says."""
+
+    segmentation: Segmentation
+    picture: LabelImage
+    options: MeshOptions
+    calibration: Calibration
+    notes: tuple[str, ...]
+
+
+def _begun(source: Source | Segmentation, options: MeshOptions | None, timed: _Stopwatch, made: Memory) -> _Begun:
+    """Read and segment a picture, edit its materials, crop it; pixel size and place are numbers in the options."""
+    options = MeshOptions() if options is None else options
+    if not isinstance(options, MeshOptions):
+        raise InputError(f"options is {options!r}: give a MeshOptions")
+    raw = source if isinstance(source, Segmentation) else _read(source, options, timed)
+    found = raw if isinstance(raw, Segmentation) else _segmented(raw, options, timed, made)
+    crop = None if isinstance(raw, Picture) and raw.window else options.crop  # what was read may be the part already
+    edited = made("edited", edit_materials, found.image, options.editing())
+    picture = made("picture", crop_image, edited, crop) if crop else edited
+    calibration, notes = _what_the_file_says(raw, crop, options)
+    placed = options.placed(calibration, raw.name if isinstance(raw, Picture) else "the picture")
+    return _Begun(found, picture, placed, calibration, notes)
 
 
 def _read(source: Source, options: MeshOptions, timed: _Stopwatch) -> Picture | LabelImage:

@@ -72,10 +72,7 @@ def outlines_of(
     extraction, smoothing
         Options of these stages.
     """
-    nobody = Materials(np.empty(0, np.int32), (), np.empty((0, 3), np.uint8))
-    raw = extract_boundaries(LabelImage(keys.pixels, nobody), extraction)
-    key_of = np.asarray(raw.region_label, np.int64)
-    raw = replace(raw, region_label=regions.label[keys.region[key_of]])
+    raw, key_of = _extracted(keys, regions, extraction)
     owners = np.append(keys.tile[key_of], NOBODY)[raw.chain_regions]
     ends = np.stack([raw.chain_points[raw.chain_offsets[:-1]], raw.chain_points[raw.chain_offsets[1:] - 1]], axis=1)
     low, high = _owners_at(raw, ends, owners)
@@ -90,14 +87,8 @@ def outlines_of(
     shared = (owners[:, 0] != owners[:, 1]) & (owners != NOBODY).all(axis=1)
     offsets, ids, old = _compressed(smooth, kept)
     shift = np.array([window[0], n_rows - window[3]], float)
-    corner = np.array([2 * window[1], 2 * window[0]])
-
-    def doubled(points: Ints) -> NDArray[np.int64]:
-        x, y = raw.points[points].T
-        return np.asarray(np.rint(2 * np.stack([raw.shape[0] - y, x], axis=1)).astype(np.int64) + corner)
-
     start = raw.chain_offsets[which]
-    key = np.hstack([doubled(raw.chain_points[start]), doubled(raw.chain_points[start + 1])])
+    key = np.hstack([_doubled(raw, window, raw.chain_points[start + k]) for k in (0, 1)])
     at_ends = np.stack([ids[offsets[:-1]], ids[offsets[1:] - 1]], axis=1)
     fixed = np.isin(raw.point_kind, (PointKind.JUNCTION, PointKind.CORNER))
     closed = ~fixed[ends[which, 0]]
@@ -115,11 +106,26 @@ def outlines_of(
         closed=closed,
         seam=shared & (region[:, 0] == region[:, 1]),
         key=key,
-        node=np.column_stack([here, low[origin], doubled(origin)]),
+        node=np.column_stack([here, low[origin], _doubled(raw, window, origin)]),
         region=keys.region[key_of[faces]],
         label=np.asarray(raw.region_label[faces]),
         pixels=np.asarray(smooth.region_pixels[faces]),
     )
+
+
+def _extracted(keys: Keys, regions: Regions, extraction: ExtractionOptions) -> tuple[BoundaryGraph, Ints]:
+    """Return the pixel boundary of a window, with the materials of its regions, and the key of each region."""
+    nobody = Materials(np.empty(0, np.int32), (), np.empty((0, 3), np.uint8))
+    raw = extract_boundaries(LabelImage(keys.pixels, nobody), extraction)
+    key_of = np.asarray(raw.region_label, np.int64)
+    return replace(raw, region_label=regions.label[keys.region[key_of]]), key_of
+
+
+def _doubled(raw: BoundaryGraph, window: Box, points: Ints) -> NDArray[np.int64]:
+    """Return twice the row and column of points in the picture: whole numbers."""
+    x, y = raw.points[points].T
+    rows_columns = np.rint(2 * np.stack([raw.shape[0] - y, x], axis=1)).astype(np.int64)
+    return np.asarray(rows_columns + np.array([2 * window[1], 2 * window[0]]))
 
 
 def _owners_at(raw: BoundaryGraph, ends: Ints, owners: Ints) -> tuple[Ints, Ints]:

@@ -16,7 +16,8 @@ from imgquad_core.measures.quality import quality_report, require_quality
 from imgquad_core.model import VOID, LabelImage, Materials
 from imgquad_core.options import MeshOptions
 from imgquad_core.picture.selection import crop_image, drop_materials, material_number
-from imgquad_core.pipeline import STAGES, mesh_image, run, thin_features
+from imgquad_core.pipeline import STAGES, mesh_image, run
+from imgquad_core.remedies import thin_features
 from support.invariants import assert_valid_mesh
 from support.labels import KINDS, Labels, label_image, labels_of_kind, voronoi, wedge
 

@@ -448,8 +448,8 @@ def mesh(
         begin("segment")
         found = datasets.segmented(image, scalars, core.picture.SegmentationOptions(**early))
         done = core.pipeline.run(found, options, lambda stage, *_: begin(stage))
-    many = core.pipeline.thin_features(done.labels, done.pixel_mesh, options)
-    _warn((*found.warnings, *core.pipeline.lost_materials(done), *([many] if many else [])))
+    many = core.remedies.thin_features(done.labels, done.pixel_mesh, options)
+    _warn((*found.warnings, *core.remedies.lost_materials(done), *([many] if many else [])))
     grid = datasets.to_grid(done.pixel_mesh, placement.divided(done.labels.shape, done.boundary.shape))
     _sample(grid, done.pixel_mesh, columns, done.boundary.shape)
     return grid

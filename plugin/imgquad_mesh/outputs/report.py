@@ -20,7 +20,8 @@ from imgquad_core.ledger import material_ledger, region_errors
 from imgquad_core.measures.quality import bad_places, forced_quads, quality_report, scaled_jacobian
 from imgquad_core.mesher import triangulator_used
 from imgquad_core.model import BoundaryGraph, PointKind
-from imgquad_core.pipeline import Run, lost_materials, thin_features
+from imgquad_core.pipeline import Run
+from imgquad_core.remedies import lost_materials, thin_features
 
 PACKAGES = ("imgquad-mesh", "numpy", "scipy", "numba", "scikit-image", "triangle", "pythoncdt", "pyvista", "vtk")
 MOST_MATERIALS = 10  #: that lost regions are named
