@@ -133,10 +133,10 @@ def _remove_all() -> None:
 def _locked(folder: Path, wait: bool = False) -> Iterator[bool]:
     """Hold the lock of a folder; give whether it was had: not where another process holds it, or there are no locks."""
     try:
-        import fcntl
+        import fcntl  # there is none on Windows
 
         handle = os.open(folder, os.O_RDONLY)
-    except (ImportError, OSError):  # Windows
+    except (ImportError, OSError):
         yield False
         return
     try:

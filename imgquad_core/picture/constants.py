@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import binary_dilation, binary_erosion
 
 from imgquad_core.arrays import Flags
 
@@ -40,8 +41,6 @@ def constants_of(levels: Levels, noise: float) -> list[Constant]:
 
 
 def _constant(levels: Levels, pixels: Flags, noise: float) -> Constant | None:
-    from scipy.ndimage import binary_dilation, binary_erosion
-
     if levels.void is not None:
         pixels = pixels & ~levels.void
     n = int(np.count_nonzero(pixels))

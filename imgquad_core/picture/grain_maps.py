@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import skimage
+from scipy.ndimage import label, maximum_filter, minimum_filter
 
 from imgquad_core.arrays import Bytes, Floats, Ints, Labels
 from imgquad_core.errors import InputError
@@ -45,8 +47,6 @@ def cores_of(plane: Bytes, noise: float, void: object = None) -> Cores:
     void : bool, shape (n_rows, n_cols), optional
         Pixels that belong to no grain.
     """
-    from scipy.ndimage import label, maximum_filter, minimum_filter
-
     channels = range(plane.shape[2])
     spans = [maximum_filter(plane[..., k], 3) - minimum_filter(plane[..., k], 3) for k in channels]
     edges = np.maximum.reduce(spans)
@@ -91,15 +91,13 @@ def regions_of(levels: Levels) -> LabelImage:
     InputError
         For a picture without a region of 25 pixels of one colour.
     """
-    from skimage.segmentation import watershed
-
     noise = noise_of(levels)
     plane = smoothed(levels, noise, None).plane
     cores = cores_of(plane, noise, levels.void)
     if len(cores.means) == 0:
         raise InputError(f"no region of {PIXELS} pixels has one colour: give another choice of colors than regions")
     inside = None if levels.void is None else ~levels.void
-    labels = watershed(cores.edges, cores.labels, mask=inside) - 1  # type: ignore[no-untyped-call]
+    labels = skimage.segmentation.watershed(cores.edges, cores.labels, mask=inside) - 1  # type: ignore[no-untyped-call]
     colors = np.rint(cores.means if levels.values.shape[2] == 3 else np.repeat(cores.means, 3, axis=1))
     names = tuple(f"region {k}" for k in range(len(colors)))
     return LabelImage(labels, Materials(np.arange(len(colors)), names, colors.astype(np.uint8)))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from imgquad_core.arrays import Flags, Floats, Singles
 from imgquad_core.jit import kernel
@@ -134,8 +135,6 @@ def filled(values: NDArray[Any], void: Flags | None) -> NDArray[Any]:
     """Return values with those of void pixels replaced by the nearest that is not void."""
     if void is None or not void.any() or void.all():
         return values
-    from scipy.ndimage import distance_transform_edt
-
     r, c = distance_transform_edt(void, return_distances=False, return_indices=True)
     return np.asarray(values[r, c])
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import skimage
 from numpy.typing import ArrayLike, NDArray
 
 from imgquad_core.arrays import Flags, Floats, Labels, Singles
@@ -141,15 +142,13 @@ def grow_from(levels: Levels, marks: Marks, learn: bool = False) -> LabelImage:
     five minerals between crossed polars, 5 strokes a mineral give an adjusted Rand index of about 0.5, 30 strokes 0.6;
     no method without marks came above 0.2.
     """
-    from skimage.segmentation import watershed
-
     markers = marks.labels + 1  # 0: none
     if levels.void is not None:
         markers = np.where(levels.void, 0, markers)
     if learn:
         markers = np.where(markers > 0, markers, _learnt(levels, markers))
     inside = None if levels.void is None else ~levels.void
-    labels = watershed(_gradient(levels), markers, mask=inside) - 1  # type: ignore[no-untyped-call]
+    labels = skimage.segmentation.watershed(_gradient(levels), markers, mask=inside) - 1  # type: ignore[no-untyped-call]
     return LabelImage(labels, marks.materials)
 
 
@@ -165,7 +164,7 @@ def _gradient(levels: Levels) -> Singles:
 def _learnt(levels: Levels, markers: NDArray[Any]) -> Labels:
     """Return markers where a forest that has learnt from `markers` is sure of the material, else 0."""
     try:
-        from sklearn.ensemble import RandomForestClassifier
+        from sklearn.ensemble import RandomForestClassifier  # an extra
     except ImportError as error:
         raise InputError("learn needs scikit-learn: pip install 'imgquad-mesh[learn]', or grow without it") from error
     examples, answers = [], []
@@ -195,11 +194,9 @@ def _strips(levels: Levels) -> list[tuple[int, int]]:
 
 def _features(levels: Levels, first: int, last: int) -> Singles:
     """Return features of some rows, shape (n_rows, n_cols, n_features): shades, edges, texture at several scales."""
-    from skimage.feature import multiscale_basic_features
-
     start, end = max(first - OVERLAP, 0), min(last + OVERLAP, levels.shape[0])
     shades = levels.rows(start, end)
     image, axis = (shades[..., 0], None) if levels.is_grey else (shades, -1)
     low, high = SCALES
-    found: Any = multiscale_basic_features(image, sigma_min=low, sigma_max=high, channel_axis=axis)  # type: ignore[no-untyped-call]
+    found: Any = skimage.feature.multiscale_basic_features(image, sigma_min=low, sigma_max=high, channel_axis=axis)  # type: ignore[no-untyped-call]
     return np.asarray(found[first - start : last - start], np.float32)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import skimage
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
@@ -179,6 +180,4 @@ def errors_of(points: Floats, weights: Floats, found: list[Floats]) -> Floats:
 
 def cielab(levels: Floats) -> Floats:
     """Return RGB levels, shape (n, 3), 0 to 255, in CIELAB."""
-    from skimage.color import rgb2lab
-
-    return np.asarray(rgb2lab(levels / 255.0), float)
+    return np.asarray(skimage.color.rgb2lab(levels / 255.0), float)

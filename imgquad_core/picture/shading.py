@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import binary_erosion, gaussian_filter, maximum_filter, minimum_filter
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 
@@ -79,8 +80,6 @@ def _span(levels: Levels, coefficients: Floats) -> float:
 
 def _flat_places(plane: Bytes, noise: float, without: Flags | None) -> tuple[Ints, ...]:
     """Return rows and columns of flat pixels, evenly thinned."""
-    from scipy.ndimage import binary_erosion, maximum_filter, minimum_filter
-
     flat = maximum_filter(plane, 3) - minimum_filter(plane, 3) <= max(2.0, noise)
     if without is not None:
         flat &= ~without
@@ -92,8 +91,6 @@ def _flat_places(plane: Bytes, noise: float, without: Flags | None) -> tuple[Int
 
 def _gradients(levels: Levels, places: tuple[Ints, ...]) -> tuple[Floats, Floats, Floats]:
     """Return the smoothed picture, and its derivatives along columns and rows."""
-    from scipy.ndimage import gaussian_filter
-
     r, c = places
     smooth = gaussian_filter(levels.rows(0, levels.shape[0])[..., 0], GAUSS)
     by_x = (smooth[r, c + 1].astype(float) - smooth[r, c - 1]) / 2.0

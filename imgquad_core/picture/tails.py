@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import binary_dilation, label, uniform_filter1d
 
 from imgquad_core.arrays import Bytes, Flags, Floats
 
@@ -65,8 +66,6 @@ def _middle_and_deviation(weights: Floats) -> tuple[float, float]:
 
 def _valley(weights: Floats, middle: float, deviation: float) -> float:
     """Return how far above `middle` the valley before another peak of a histogram lies; inf where there is none."""
-    from scipy.ndimage import uniform_filter1d
-
     first = int(np.ceil(middle + FOOT * deviation))
     beyond = uniform_filter1d(weights, AVERAGED)[first:]
     if len(beyond) == 0:
@@ -83,8 +82,6 @@ def _level_of(plane: Bytes, beyond: Flags, support: Flags, middle: float) -> flo
 
     A phase ends at an edge: what is around it lies nearer to the `middle` of its neighbour. A halo fades out.
     """
-    from scipy.ndimage import label
-
     if np.count_nonzero(beyond) < SHARE * plane.size:
         return None
     parts, n = label(beyond)
@@ -101,8 +98,6 @@ def _level_of(plane: Bytes, beyond: Flags, support: Flags, middle: float) -> flo
 
 def _ends_at_edges(plane: Bytes, inside: Flags, level: float, middle: float) -> bool:
     """Whether most pixels that are `AROUND` away from a part lie less than half way from `middle` to its level."""
-    from scipy.ndimage import binary_dilation
-
     near = binary_dilation(inside, iterations=AROUND - 1)
     around = plane[binary_dilation(near) & ~near]
     return len(around) == 0 or abs(level - middle) > 2.0 * float(np.median(around) - middle) * np.sign(level - middle)

@@ -16,6 +16,8 @@ from functools import cache
 from math import cos, pi, sin, sqrt
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Flags, Floats, Ints, Labels
 from imgquad_core.errors import InputError
@@ -158,9 +160,6 @@ def find_grains(phase: Labels, quaternions: Floats, laue: Mapping[int, str], thr
     int32, shape (n_rows, n_cols)
         1, 2, ... in the order of their first pixels, row by row; -1 where there is no phase.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     if not 0.0 < threshold <= 180.0:
         raise InputError(f"grain-angle is {threshold}: give degrees above 0, up to 180")
     links = _links(phase, quaternions, laue, threshold * pi / 180.0)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
 
 from imgquad_core.errors import InputError
 
@@ -33,8 +34,6 @@ def read_by_pillow(path: Path, options: ReadOptions) -> Picture:
     InputError
         It is none of them, damaged, too large, or a stack of which none is chosen.
     """
-    from PIL import Image, UnidentifiedImageError
-
     with _own_pixel_limit(), decoding(path):
         try:
             image = Image.open(path, formats=FORMATS)
@@ -52,8 +51,6 @@ def read_by_pillow(path: Path, options: ReadOptions) -> Picture:
 @contextmanager
 def _own_pixel_limit() -> Iterator[None]:
     """Leave the decision on large pictures to `max_pixels`; Pillow keeps a global limit of its own."""
-    from PIL import Image
-
     limit = Image.MAX_IMAGE_PIXELS
     Image.MAX_IMAGE_PIXELS = None
     try:
@@ -148,7 +145,7 @@ def _is_deep(image: Any) -> bool:
 
 def _deep(image: Any, path: Path) -> Picture:
     try:
-        from imagecodecs import png_decode
+        from imagecodecs import png_decode  # an extra
     except ImportError:
         found = _of_values(image, str(path))
         told = f"16 bits a channel, of which the upper 8 are taken: {missing_extra('tiff')} for all"

@@ -68,7 +68,7 @@ def _rounded_square(size: PixelSize) -> PixelSize:
 def _ome(file: Any, page: Any) -> PixelSize | None:
     if not file.is_ome:
         return None
-    from defusedxml.ElementTree import fromstring
+    from defusedxml.ElementTree import fromstring  # not above: other pictures do without it
 
     pixels = next(node for node in fromstring(file.ome_metadata).iter() if node.tag.endswith("}Pixels"))
     given = pixels.attrib

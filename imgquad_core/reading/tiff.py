@@ -56,7 +56,7 @@ class Plane:
 
 def read_tiff(path: Path, options: ReadOptions) -> Picture:
     """Read a picture from a TIFF file: by tifffile, or what it cannot decode by Pillow."""
-    import tifffile
+    import tifffile  # not above: other pictures do without it
 
     with decoding(path), _silent(), tifffile.TiffFile(path) as file:
         plane = _chosen(path, file, options)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
@@ -160,8 +161,6 @@ def _held(faces: FaceQuads, on_rim: Flags, used: Ints) -> FaceQuads:
 
 def _seeds(faces: FaceQuads, points: Floats, near: Flags) -> Flags:
     """Tell the nodes near the seam: by place, as old ones may be gone."""
-    from scipy.spatial import cKDTree
-
     if not near.any():
         return np.zeros(len(faces.points), bool)
     quads = faces.points[faces.quads]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.errors import TopologyError
+from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.mesher import MeshingOptions, mesh_boundaries
 from imgquad_core.model import VOID, PointKind, QuadMesh
@@ -137,8 +138,6 @@ def joined_meshes(meshes: list[TileMesh]) -> tuple[TileMesh, Ints, Ints]:
 
 def open_nodes(mesh: TileMesh) -> Ints:
     """Return the nodes on edges with a quad on one side only: those that other tiles may have, too."""
-    from imgquad_core.geometry.halfedge import twins_of
-
     if len(mesh.quads) == 0:
         return np.empty(0, np.int64)
     twins = twins_of(mesh.quads, len(mesh.points))

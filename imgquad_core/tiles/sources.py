@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,8 +13,10 @@ import numpy as np
 from imgquad_core.errors import InputError
 from imgquad_core.reading import Calibration, Picture, ReadOptions, picture_of, read_picture
 from imgquad_core.reading.decoding import decoding, optional
+from imgquad_core.reading.picture import part_of
 from imgquad_core.reading.zarr_images import is_zarr, plane_of_zarr
 
+from .files import save_plane
 from .grid import Box
 
 MOST_SAMPLED, WINDOWS = 1 << 24, 64  #: pixels of a sample, and windows that it is made of where the picture has more
@@ -58,13 +61,7 @@ class Source:
                 return replace(picture_of(np.asarray(array.array[array.at(box)]), self.name), labels=array.is_labels)
             limited = replace(self.options, crop=box, max_pixels=max((right - left) * (lower - upper), 1))
             found = read_picture(path, limited)
-            return replace(found, name=self.name) if found.window else _cut(found, box)
-
-
-def _cut(picture: Picture, box: Box) -> Picture:
-    from imgquad_core.reading.picture import part_of
-
-    return part_of(picture, box)
+            return replace(found, name=self.name) if found.window else part_of(found, box)
 
 
 def source_of(path: Path, options: ReadOptions, scratch: Path) -> Source:
@@ -103,7 +100,7 @@ def source_of(path: Path, options: ReadOptions, scratch: Path) -> Source:
 
 def _tiff(path: Path, options: ReadOptions) -> Source | None:
     """Return the source of a TIFF file that is read tile by tile; None where it has to be decoded as a whole."""
-    import tifffile
+    import tifffile  # not above: other pictures do without it
 
     with decoding(path), tifffile.TiffFile(path) as file:
         page = file.pages.first
@@ -125,8 +122,6 @@ def _tiff(path: Path, options: ReadOptions) -> Source | None:
 
 def _decoded(path: Path, options: ReadOptions, scratch: Path) -> Source:
     """Decode a picture as a whole, once, and keep its pixels for windows."""
-    from .files import save_plane
-
     found = read_picture(path, options)
     values = found.values if found.palette is None else found.palette[found.values]
     lost = [name for name in ("void", "opaque") if getattr(found, name) is not None]
@@ -159,8 +154,6 @@ def stamp_of(path: Path) -> Any:
     if path.is_file():
         found = path.stat()
         return [found.st_size, found.st_mtime_ns]
-    import hashlib
-
     whole = hashlib.blake2b(digest_size=16)
     for part in sorted(path.rglob("*")):
         if part.is_file():

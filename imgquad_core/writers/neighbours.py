@@ -29,7 +29,7 @@ def is_of_xdmf(path: Path) -> bool:
     """Return whether a file is one that is written along with an `.xdmf`: names of its arrays, or its side sets."""
     if path.suffix.lower() == ".xdmf":
         return b"side_set" in path.read_bytes()
-    import h5py
+    import h5py  # an extra
 
     try:
         with h5py.File(path, "r") as file:

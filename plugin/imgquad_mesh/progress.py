@@ -1,11 +1,9 @@
-"""The progress bar of the command and of filters."""
+"""Progress bars. The command's help loads this: it needs no NumPy."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-
-import pyvista_validation
 
 DOING = {
     "read": "reading",
@@ -42,7 +40,7 @@ def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, int, int], None]]:
 @contextmanager
 def counting_if(wanted: bool, expected: Mapping[str, int | None]) -> Iterator[Callable[[str], None]]:
     """Give a function to call with the kind of each step that ends; it draws a bar a kind of those expected."""
-    from rich.console import Console
+    from rich.console import Console  # not above, as in `progress_bar_if`
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
@@ -53,12 +51,3 @@ def counting_if(wanted: bool, expected: Mapping[str, int | None]) -> Iterator[Ca
     with Progress(*columns, console=console, transient=True) as progress:
         bars = {kind: progress.add_task(kind, total=n) for kind, n in expected.items()}
         yield lambda kind: progress.advance(bars[kind]) if kind in bars else None
-
-
-@contextmanager
-def progress_of(wanted: bool) -> Iterator[Callable[[str], None]]:
-    """Give a function to call with the name of each stage that starts."""
-    pyvista_validation.check_instance(wanted, bool, name="progress_bar")
-    stages = list(DOING)
-    with progress_bar_if(wanted) as show:
-        yield lambda stage: show(stage, stages.index(stage), len(stages))

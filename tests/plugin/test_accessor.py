@@ -71,6 +71,13 @@ print(took, "numba" in sys.modules)
     assert min(map(float, seconds)) < 0.05  # the machine may be busy with something else
 
 
+def test_help_is_there_without_numpy() -> None:
+    code = "import sys; from imgquad_mesh.__main__ import build_parser; build_parser().format_help();"
+    code += "print([m for m in ('numpy', 'rich', 'pyvista') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_progress_knows_every_stage() -> None:
     assert set(STAGES) <= set(DOING)
 

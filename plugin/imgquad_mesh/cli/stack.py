@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from imgquad_core.whole_files import assert_apart
+from imgquad_mesh import large
+from imgquad_mesh.progress import counting_if
 from imgquad_mesh.texts import number
 
 from .mesh_options import add_mesh_options, mesh_options
-from .workers import add_workers
-
-if TYPE_CHECKING:
-    from imgquad_mesh.large import StackResult
+from .workers import add_workers, work_options
 
 SOME_FAILED = 3
 
@@ -37,25 +37,12 @@ def add_parser(subparsers: Any) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Mesh the stack that `args` names; return the exit code."""
-    from imgquad_core.whole_files import assert_apart
-    from imgquad_mesh.large import mesh_stack
-    from imgquad_mesh.large.slices import slices_of
-    from imgquad_mesh.progress import counting_if
-
     options = mesh_options(args)
-    found = slices_of(args.source, options.reading()).of
+    found = large.slices_of(args.source, options.reading()).of
     assert_apart([each.path for each in found if each.path], [args.output])
     with counting_if(not args.quiet, {"mesh": len(found)}) as told:
-        made = mesh_stack(
-            args.source,
-            args.output,
-            options,
-            spacing=args.spacing,
-            workers=args.workers,
-            scheduler=args.scheduler,
-            restart=args.restart,
-            told=told,
-        )
+        how = work_options(args)
+        made = large.mesh_stack(args.source, args.output, options, spacing=args.spacing, told=told, **how)
     if not args.quiet:
         _print(made)
     for name, reason in made.failed:
@@ -63,7 +50,7 @@ def execute(args: argparse.Namespace) -> int:
     return SOME_FAILED if made.failed else 0
 
 
-def _print(made: StackResult) -> None:
+def _print(made: large.StackResult) -> None:
     report, quality = made.report, made.report["quality"]
     print(report["legend"])
     for text in report["warnings"]:

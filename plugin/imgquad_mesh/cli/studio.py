@@ -35,6 +35,7 @@ def add_parser(subparsers: Any) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Serve until interrupted; return the exit code."""
     try:
+        # an extra is needed for these
         from imgquad_mesh.studio.server import Place, serve
         from imgquad_mesh.studio.sessions import Limits
     except ImportError as error:

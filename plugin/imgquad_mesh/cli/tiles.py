@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from imgquad_mesh import large, outputs
+from imgquad_mesh.progress import counting_if
 
 from .mesh_options import add_mesh_options, mesh_options
-from .workers import add_workers
-
-if TYPE_CHECKING:
-    from imgquad_mesh.large import TiledMesh
+from .workers import add_workers, work_options
 
 
 def add_parser(subparsers: Any) -> None:
@@ -34,14 +34,10 @@ def add_parser(subparsers: Any) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Mesh the picture that `args` names; return the exit code."""
-    from imgquad_mesh.large import mesh_tiles
-    from imgquad_mesh.outputs.files import check_files
-    from imgquad_mesh.progress import counting_if
-
-    check_files([args.image], [args.deck])
+    outputs.check_files([args.image], [args.deck])
     kinds = ("labels", "outlines", "mesh", "band", "piece")
     with counting_if(not args.quiet, dict.fromkeys(kinds)) as told:
-        made = mesh_tiles(
+        made = large.mesh_tiles(
             args.image,
             args.output,
             mesh_options(args),
@@ -49,17 +45,15 @@ def execute(args: argparse.Namespace) -> int:
             keep_whole=args.keep_whole,
             form=args.format,
             deck=args.deck,
-            workers=args.workers,
-            scheduler=args.scheduler,
-            restart=args.restart,
             told=told,
+            **work_options(args),
         )
     if not args.quiet:
         _print(made)
     return 0
 
 
-def _print(made: TiledMesh) -> None:
+def _print(made: large.TiledMesh) -> None:
     report = made.report
     grid, quality, regions = report["grid"], report["quality"], report["regions"]
     for text in report["notes"]:

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 from time import perf_counter
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 import imgquad_core as core
 from imgquad_mesh import cli, outputs
@@ -27,18 +23,9 @@ def execute(args: argparse.Namespace) -> int:
     """Mesh small pictures of several kinds with all efforts; return the exit code."""
     start = perf_counter()
     cli.console.announce_compiling()
-    for picture in _pictures():
+    for picture in outputs.small_pictures(*SMALL):
         for effort in ("normal", "fast", "best"):
             core.run(picture, core.MeshOptions(size=3.0, min_pixels=4, min_length=2.0, effort=effort))
     share, seconds = core.pipeline.share_compiled(), perf_counter() - start
     print(f"{share:.0%} of the kernels are compiled, after {seconds:.0f} s; the others come with what needs them")
     return 0
-
-
-def _pictures() -> Iterator[NDArray[Any]]:
-    """Give labels, a photograph in grey, and colours."""
-    labels = outputs.rock_labels(*SMALL, grain=24)
-    yield labels
-    noise = np.random.default_rng(0).normal(0, 6, labels.shape)
-    yield (40 * labels + noise).clip(0, 255).astype(np.uint8)
-    yield np.asarray(outputs.draw_rock().convert("RGB").crop((0, 0, *SMALL)))

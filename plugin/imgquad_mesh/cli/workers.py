@@ -17,6 +17,11 @@ def add_workers(parser: argparse.ArgumentParser, group: Any) -> None:
     group.add_argument("--quiet", action="store_true", help="print nothing but errors")
 
 
+def work_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what `args` says of these options, as keywords of `mesh_stack` and `mesh_tiles`."""
+    return {name: getattr(args, name) for name in ("workers", "scheduler", "restart")}
+
+
 def _at_least_one(text: str) -> int:
     if not text.isdigit() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text} is no number of workers: give 1 or more")

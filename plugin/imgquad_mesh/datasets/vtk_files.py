@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 from imgquad_core.errors import InputError
 from imgquad_core.reading.calibration import Calibration, size_of
@@ -76,7 +77,7 @@ def _image(path: Path, options: ReadOptions) -> pv.ImageData:
         with silent_vtk():
             reader = pv.XMLImageDataReader(str(path)) if is_vti else pv.get_reader(str(path))  # type: ignore[no-untyped-call]
             reader.reader.UpdateInformation()
-            extent = reader.reader.GetOutputInformation(0).Get(_WHOLE_EXTENT())
+            extent = reader.reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT())
             sides = [high - low + 1 for low, high in zip(extent[::2], extent[1::2], strict=True)]
             n_values = int(np.prod(sides, dtype=object))
             _assert_bytes(path, sides, n_values, is_vti)
@@ -90,12 +91,6 @@ def _image(path: Path, options: ReadOptions) -> pv.ImageData:
     if image.n_points == 0 or not image.array_names:
         raise InputError(f"{path} has no pixels, or is damaged: save it with an array of labels, greys or colours")
     return image
-
-
-def _WHOLE_EXTENT() -> Any:
-    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-
-    return vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
 
 
 def _assert_bytes(path: Path, sides: list[int], n_values: int, is_vti: bool) -> None:

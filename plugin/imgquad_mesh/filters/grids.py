@@ -10,9 +10,8 @@ import pyvista as pv
 
 import imgquad_core as core
 from imgquad_mesh import datasets
-from imgquad_mesh.progress import progress_of
 
-from .parameters import checked, choice
+from .parameters import checked, choice, progress_of
 from .plotting import MEASURES, add_to_plotter
 
 Effort: TypeAlias = Literal["fast", "normal", "best"]

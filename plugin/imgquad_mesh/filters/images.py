@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 import imgquad_core as core
 from imgquad_mesh import datasets
-from imgquad_mesh.progress import progress_of
 
 from .grids import Effort
-from .parameters import checked
+from .parameters import checked, progress_of
 
 Auto: TypeAlias = Literal["auto"]
 Unit: TypeAlias = Literal["pixels", "world"]

@@ -9,11 +9,10 @@ import pyvista as pv
 import imgquad_core as core
 from imgquad_core.errors import InputError
 from imgquad_mesh import datasets
-from imgquad_mesh.progress import progress_of
 
 from .grids import Effort
 from .images import MaterialSizes, Periodic, SizesBetween, Step, Triangulator, Unit, in_pixels
-from .parameters import checked
+from .parameters import checked, progress_of
 
 
 def smooth(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from numbers import Number
 from pathlib import Path
@@ -13,6 +14,7 @@ import pyvista as pv
 import pyvista_validation
 
 import imgquad_core as core
+from imgquad_mesh.progress import DOING, progress_bar_if
 
 _validation: Any = pyvista_validation  # its overloads are too many for type checkers
 UNITS = ("pixels", "world")
@@ -218,3 +220,12 @@ _OWN: Mapping[str, Callable[[Any, str], Any]] = {
     "progress_bar": _flag,
     "unit": lambda value, name: choice(value, name, UNITS),
 }
+
+
+@contextmanager
+def progress_of(wanted: bool) -> Iterator[Callable[[str], None]]:
+    """Give a function to call with the name of each stage that starts."""
+    pyvista_validation.check_instance(wanted, bool, name="progress_bar")
+    stages = list(DOING)
+    with progress_bar_if(wanted) as show:
+        yield lambda stage: show(stage, stages.index(stage), len(stages))

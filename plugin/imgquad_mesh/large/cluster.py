@@ -7,7 +7,11 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
+import numpy as np
+
+from imgquad_core import MeshOptions, mesh_image
 from imgquad_core.errors import InputError
+from imgquad_core.jit import share_on_disk
 
 from .graph import ClusterError, Step, Told, run_here, run_on
 
@@ -15,34 +19,34 @@ REACHED = 20  #: seconds in which a scheduler must answer
 
 
 @contextmanager
-def opened(workers: int, scheduler: str | None) -> Iterator[Any]:
-    """Give a client of a scheduler, or of so many workers on this machine; None for one worker: this process.
+def opened(workers: int, scheduler: str | None, client: Any) -> Iterator[Any]:
+    """Give the client that is given, that of a scheduler, or of so many workers here; None for one: this process.
 
     Raises
     ------
     InputError
         Dask is not installed, or there is no scheduler at the address.
     """
-    if scheduler is None and workers <= 1:
-        yield None
+    if client is not None or (scheduler is None and workers <= 1):
+        yield client
         return
     if find_spec("distributed") is None:
         raise InputError("more than one worker needs Dask: pip install dask distributed (or imgquad-mesh[dask])")
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster  # an extra
 
     if scheduler is not None:
-        with _reached(scheduler) as client:
-            yield client
+        with _reached(scheduler) as reached:
+            yield reached
         return
     warm_up()
     dashboard = ":0" if find_spec("bokeh") else None
     options = {"threads_per_worker": 1, "dashboard_address": dashboard, "silence_logs": 50}
-    with LocalCluster(n_workers=workers, **options) as cluster, Client(cluster) as client:
-        yield client
+    with LocalCluster(n_workers=workers, **options) as cluster, Client(cluster) as started:
+        yield started
 
 
 def _reached(address: str) -> Any:
-    from distributed import Client
+    from distributed import Client  # an extra
 
     try:
         return Client(address, timeout=REACHED, set_as_default=False)
@@ -54,11 +58,6 @@ def _reached(address: str) -> Any:
 
 def warm_up() -> None:
     """Compile the kernels in this process, if that was never done: else each worker would."""
-    import numpy as np
-
-    from imgquad_core import MeshOptions, mesh_image
-    from imgquad_core.jit import share_on_disk
-
     if share_on_disk() < 0.9:
         labels = np.add.outer(np.arange(48) // 24, np.arange(48) // 24)
         mesh_image(labels, MeshOptions(size=3.0))
@@ -74,7 +73,7 @@ def _current() -> Any:
     """Return the client of Dask that is current here, None if there is none."""
     if find_spec("distributed") is None:
         return None
-    from distributed import default_client
+    from distributed import default_client  # an extra
 
     try:
         return default_client()

@@ -49,21 +49,26 @@ def run_here(steps: Iterable[Step], told: Told) -> dict[str, Any]:
     """Run steps in this process, in their order, and return what they return."""
     done: dict[str, Any] = {}
     for step in steps:
-        done[step.key] = step.call(*_put_in(step.args, done, _computed))
+        done[step.key] = call(step, done)
         told(kind_of(step.key))
     return done
 
 
+def call(step: Step, done: Mapping[str, Any]) -> Any:
+    """Do a step in this process with the results of others; return what it returns."""
+    return step.call(*_put_in(step.args, done, _computed))
+
+
 def as_delayed(steps: Iterable[Step]) -> dict[str, Any]:
     """Return the steps as `dask.delayed`, named "imgquad-mesh-TOKEN-0-7": the dashboard groups them by kind."""
-    import dask
+    import dask  # an extra
 
     token, made = uuid4().hex[:8], dict[str, Any]()
     for step in steps:
         kind, _, rest = step.key.partition("-")
         name = "-".join(filter(None, ("imgquad", kind, token, rest)))
-        call = dask.delayed(step.call, pure=False)
-        made[step.key] = call(*_put_in(step.args, made, lambda value: value), dask_key_name=name)
+        delayed = dask.delayed(step.call, pure=False)
+        made[step.key] = delayed(*_put_in(step.args, made, lambda value: value), dask_key_name=name)
     return made
 
 
@@ -90,7 +95,7 @@ def run_on(client: Any, steps: Iterable[Step], told: Told) -> dict[str, Any]:
 
 
 def _completed(client: Any, futures: list[Any]) -> Iterator[Any]:
-    from distributed import as_completed
+    from distributed import as_completed  # an extra
 
     left = set(futures)
     for future in as_completed(futures, loop=client.loop):
@@ -102,7 +107,7 @@ def _completed(client: Any, futures: list[Any]) -> Iterator[Any]:
 
 def _result(client: Any, key: str, future: Any) -> Any:
     """Return what a future holds."""
-    from distributed import KilledWorker
+    from distributed import KilledWorker  # an extra
 
     if future.cancelled() or client.status in ("closed", "closing"):
         raise _lost(client)

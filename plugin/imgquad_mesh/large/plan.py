@@ -6,6 +6,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from imgquad_core.errors import InputError
 from imgquad_core.options import MeshOptions
 from imgquad_core.reading import Picture
-from imgquad_mesh.outputs.files import write_json
+from imgquad_mesh import outputs
 
 PLAN = "plan.json"
 WRITTEN, FOLDERS = (".vtu", ".json", ".pvtu", ".vtkhdf"), ("work", "mesh")  #: what runs leave in their folder
@@ -41,7 +42,7 @@ def start_plan(folder: Path, plan: Mapping[str, Any], restart: bool) -> None:
     if found is not None and restart:
         _clear(folder)
     if found != asked or restart:
-        write_json(asked, folder / PLAN)
+        outputs.write_json(asked, folder / PLAN)
 
 
 def _plan_in(folder: Path) -> dict[str, Any] | None:
@@ -82,8 +83,6 @@ def _clear(folder: Path) -> None:
 
 def options_as_json(options: MeshOptions) -> dict[str, Any]:
     """Return options as values that JSON holds."""
-    from dataclasses import fields
-
     return {field.name: repr(getattr(options, field.name)) for field in fields(options)}
 
 

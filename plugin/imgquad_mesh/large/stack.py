@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+from xml.sax.saxutils import quoteattr
+
+import pyvista as pv
 
 import imgquad_core as core
 from imgquad_core.errors import ImgquadError, InputError
@@ -25,15 +27,12 @@ from imgquad_core.reading import Picture
 from imgquad_core.reading.picture import part_of
 from imgquad_core.tiles import Rules, legend_as_json, load_rules, rules_of, save_rules
 from imgquad_core.tiles.sources import MOST_SAMPLED, SPREAD, WINDOWS
-from imgquad_mesh.outputs.files import check_target, replace_file, write_json
+from imgquad_mesh import datasets, outputs
 
 from .cluster import opened, run_steps
-from .graph import Failed, Result, Step, Told, as_delayed
+from .graph import Failed, Result, Step, Told, as_delayed, call
 from .plan import digest_of, digest_of_text, options_as_json, start_plan
 from .slices import Slice, read_slice, slices_of
-
-if TYPE_CHECKING:
-    import pyvista as pv
 
 RULES = "rules.json"
 
@@ -63,8 +62,6 @@ class StackResult:
 
     def __getitem__(self, k: int) -> pv.UnstructuredGrid:
         """Return the mesh of a slice, read from its file."""
-        import pyvista as pv
-
         row = self.report["slices"][k]
         if "error" in row:
             raise InputError(f"slice {row['slice']} has no mesh: {row['error']}")
@@ -137,24 +134,16 @@ def mesh_stack(
     }
     start_plan(folder, plan, restart)
     steps = list(_steps(found.of, found.planes, options, spacing, folder))
+    rows = [Result(f"mesh-{k}") for k in range(len(found.of))]
+    finish = Step("finish", _finished, (rows, Result("rules"), output, found.of))
     if not compute:
-        rows = [Result(f"mesh-{k}") for k in range(len(found.of))]
-        finish = Step("finish", _finished, (rows, Result("rules"), output, found.of))
-        return as_delayed([*steps, finish])["finish"]
-    with opened(workers, scheduler) if client is None else nullcontext(client) as used:
-        done = run_steps(steps, used, told)
-    rows = [done[f"mesh-{k}"] for k in range(len(found.of))]
-    return _finished(rows, done["rules"], output, found.of)
-
-
-def count_steps(source: Any, options: MeshOptions) -> dict[str, int]:
-    """Return how many steps of each kind a stack takes."""
-    n = len(slices_of(source, options.reading()).of)
-    return {"look": n, "sample": 1, "tally": n, "rules": 1, "mesh": n}
+        return as_delayed([*steps, finish])[finish.key]
+    with opened(workers, scheduler, client) as used:
+        return call(finish, run_steps(steps, used, told))
 
 
 def _check(output: Path, options: MeshOptions, spacing: float) -> None:
-    check_target(output, (".pvd",))
+    outputs.check_target(output, (".pvd",))
     if options.frame is not None:
         raise InputError(f"frame is {options.frame}, but all pictures of a stack are meshed: leave it out")
     if not spacing > 0.0:
@@ -293,10 +282,6 @@ def _row_in(path: Path, key: str) -> dict[str, Any] | None:
 
 
 def _meshed(which: Slice, plane: Any, look: Look, rules: Rules, z: float, path: Path, key: str) -> dict[str, Any]:
-    from imgquad_mesh.datasets.grids import to_grid
-    from imgquad_mesh.outputs import save_dataset
-    from imgquad_mesh.outputs.report import build_report
-
     start = perf_counter()
     options = rules.options
     picture = read_slice(which, plane, options.reading())
@@ -305,13 +290,14 @@ def _meshed(which: Slice, plane: Any, look: Look, rules: Rules, z: float, path: 
     calibration = picture.calibration.cropped(options.crop, picture.shape[0]) if options.crop else picture.calibration
     options = options.placed(calibration, which.name)
     done = core.pipeline.run(label_by(picture, rules.legend, options.segmentation()), options)
-    grid = to_grid(done.mesh)
+    grid = datasets.to_grid(done.mesh)
     grid.translate((0.0, 0.0, z), inplace=True)
-    replace_file(path, lambda temporary: save_dataset(grid, temporary))
-    report = build_report(done, Path(which.path or which.name), path, {**done.seconds, "total": perf_counter() - start})
+    outputs.replace_file(path, lambda temporary: outputs.save_dataset(grid, temporary))
+    seconds = {**done.seconds, "total": perf_counter() - start}
+    report = outputs.build_report(done, Path(which.path or which.name), path, seconds)
     made = {"slice": which.name, "key": key, "bytes": path.stat().st_size, "z": z} | report
     made["output"] = f"{path.parent.name}/{path.name}"
-    write_json(made, path.with_suffix(".json"))
+    outputs.write_json(made, path.with_suffix(".json"))
     return made
 
 
@@ -339,15 +325,13 @@ def _finished(rows: list[Any], rules: Any, output: Path, slices: Sequence[Slice]
         "slices": told,
     }
     text = collection_of([(row["z"], row["output"]) for row in good])
-    replace_file(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-    write_json(report, output.with_suffix("") / "report.json")
+    outputs.replace_file(output, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    outputs.write_json(report, output.with_suffix("") / "report.json")
     return StackResult(output, report)
 
 
 def collection_of(pieces: Sequence[tuple[float, str]]) -> str:
     """Return a ParaView collection (.pvd) of files, each with its time."""
-    from xml.sax.saxutils import quoteattr
-
     lines = [f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(file)}/>' for time, file in pieces]
     head = (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>\n'

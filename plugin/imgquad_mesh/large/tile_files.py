@@ -14,7 +14,8 @@ from imgquad_core.model import Materials
 from imgquad_core.tiles import Job
 from imgquad_core.tiles.tasks import final_mesh, node_numbers
 from imgquad_core.whole_files import replacing
-from imgquad_mesh.outputs.files import replace_file
+from imgquad_mesh import datasets, outputs
+from imgquad_mesh.datasets.field_texts import table_of
 
 QUAD = 9  #: VTK's number of that cell
 
@@ -32,18 +33,15 @@ def write_piece(job: Job, t: int, counts: Sequence[tuple[int, int]], form: str) 
 
 
 def _save_piece(job: Job, t: int, found: dict[str, Any], counts: Sequence[tuple[int, int]], path: Path) -> None:
-    import pyvista as pv
-
-    from imgquad_mesh.datasets.fields import put_materials
-    from imgquad_mesh.outputs import save_dataset
+    import pyvista as pv  # not above: the other format does without it
 
     grid = pv.UnstructuredGrid({pv.CellType.QUAD: found["quads"]}, _placed(job, found["points"]))
     for name, values in _cell_arrays(t, found).items():
         grid.cell_data[name] = values
     grid.point_data["node"] = node_numbers(job, t, first_numbers(counts))
-    put_materials(grid, job.rules().legend.materials)
+    datasets.put_materials(grid, job.rules().legend.materials)
     grid.set_active_scalars("material", preference="cell")
-    replace_file(path, lambda temporary: save_dataset(grid, temporary))
+    outputs.replace_file(path, lambda temporary: outputs.save_dataset(grid, temporary))
 
 
 def first_numbers(counts: Sequence[tuple[int, int]]) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -69,10 +67,10 @@ def write_collected(job: Job, pieces: Sequence[tuple[str, int, int]], path: Path
     """Write what shows all pieces as one."""
     if path.suffix == ".pvtu":
         text = _collection(job, [name for name, _, quads in pieces if quads])
-        replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        outputs.replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
         return
     try:
-        import h5py  # noqa: F401
+        import h5py  # noqa: F401, an extra
     except ImportError as error:
         raise InputError(".vtkhdf needs h5py: pip install h5py (or imgquad-mesh[hdf5]), or give pvtu") from error
     with replacing(path) as temporary:
@@ -103,7 +101,7 @@ def _collection(job: Job, names: Sequence[str]) -> str:
 
 def _save_hdf(job: Job, tiles: Sequence[tuple[int, int, int]], path: Path) -> None:
     """Write a VTKHDF file with a partition a tile, one tile in memory at a time."""
-    import h5py
+    import h5py  # an extra
 
     nodes, quads = (np.array([row[k] for row in tiles], np.int64) for k in (1, 2))
     with h5py.File(path, "w", libver="latest", track_order=False) as file:
@@ -139,8 +137,6 @@ def _made(group: Any, name: str, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def _put_fields(root: Any, materials: Materials) -> None:
-    from imgquad_mesh.datasets.field_texts import table_of
-
     fields = root.create_group("FieldData")
     fields["material_numbers"] = materials.labels
     fields["material_names"] = table_of(list(materials.names))  # VTK 9.7 crashes at texts in partitioned files

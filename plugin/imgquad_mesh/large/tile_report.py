@@ -12,7 +12,7 @@ from imgquad_core.ledger import LARGE_REGION
 from imgquad_core.tiles import Job
 from imgquad_core.tiles.files import load_arrays
 from imgquad_core.tiles.tasks import BINS, final_mesh
-from imgquad_mesh.outputs.report import versions
+from imgquad_mesh import outputs
 
 VERY_LARGE = 10_000  #: pixels of regions whose areas are told by themselves
 
@@ -33,7 +33,7 @@ def report_of(job: Job, rows: Sequence[Mapping[str, Any]], path: Path) -> dict[s
         "quality": _quality(rows),
         "regions": _regions(job),
         "tiles": [{name: row[name] for name in ("tile", "quads", "nodes", "min_sj")} for row in rows],
-        "versions": versions(),
+        "versions": outputs.versions(),
     }
 
 

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import imgquad_core as core
 from imgquad_core.errors import InputError
+from imgquad_core.model import QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.reading import Calibration
 from imgquad_core.tiles import ROUNDS, Job, Source, grid_of, groups_of, source_of, stamp_of
 from imgquad_core.tiles import tasks as work
+from imgquad_core.tiles.files import save_plane
 from imgquad_core.tiles.grid import least_tile
 from imgquad_core.tiles.meshes import TileMesh, welded
+from imgquad_mesh import outputs
 
 from .cluster import opened, run_steps
-from .graph import Failed, Result, Step, Told, as_delayed
+from .graph import Failed, Result, Step, Told, as_delayed, call
 from .plan import digest_of_text, options_as_json, start_plan
 from .tile_files import write_collected, write_piece
-
-if TYPE_CHECKING:
-    from imgquad_core.model import QuadMesh
+from .tile_report import report_of
 
 FORMATS = ("pvtu", "vtkhdf")
 
@@ -165,15 +165,14 @@ def mesh_tiles(
     start_plan(folder, plan, restart)
     job, stored = _job_of(source, folder, options, tile, keep)
     steps = list(_steps(job, stored, form))
+    rows, pieces = ([Result(f"{kind}-{t}") for t in range(job.grid.n_tiles)] for kind in ("finish", "piece"))
+    end = Step("end", _finished, (job, rows, pieces, form, deck))
     if not compute:
-        rows = [Result(f"finish-{t}") for t in range(job.grid.n_tiles)]
-        end = Step("end", _finished, (job, rows, [Result(f"piece-{t}") for t in range(job.grid.n_tiles)], form, deck))
-        return as_delayed([*steps, end])["end"]
-    with opened(workers, scheduler) if client is None else nullcontext(client) as used:
+        return as_delayed([*steps, end])[end.key]
+    with opened(workers, scheduler, client) as used:
         done = run_steps(steps, used, told)
     _assert_done(job, steps, done)
-    every = range(job.grid.n_tiles)
-    return _finished(job, [done[f"finish-{t}"] for t in every], [done[f"piece-{t}"] for t in every], form, deck)
+    return call(end, done)
 
 
 def _check(options: MeshOptions, form: str, deck: str | Path | None) -> None:
@@ -193,9 +192,7 @@ def _check(options: MeshOptions, form: str, deck: str | Path | None) -> None:
     if sides[0] != sides[1]:
         raise InputError(f"pixel_size is {sides}, but tiles need square pixels: resample the picture")
     if deck is not None:
-        from imgquad_mesh.outputs.files import check_target, mesh_extensions
-
-        check_target(Path(deck), mesh_extensions())
+        outputs.check_target(Path(deck), outputs.mesh_extensions())
 
 
 def _named(source: Any) -> Any:
@@ -232,8 +229,6 @@ def _source_of(source: Any, inside: Path, options: MeshOptions) -> tuple[Source,
     made = Source(str(path), (int(shape[0]), int(shape[1])), "the array", options.reading(), Calibration())
     if not is_dask:
         if not path.exists():
-            from imgquad_core.tiles.files import save_plane
-
             save_plane(path, np.asarray(source))
         return made, None
     if (inside / "rules.json").exists():  # whoever has looked at it, had all of it
@@ -333,17 +328,13 @@ def _finished(
     job: Job, rows: Sequence[Mapping[str, Any]], pieces: Sequence[Any], form: str, deck: str | Path | None
 ) -> TiledMesh:
     """Write what shows the whole, the report, and the deck."""
-    from imgquad_mesh.outputs.files import write_json, write_mesh_file
-
-    from .tile_report import report_of
-
     folder = Path(job.folder).parent
     path = folder / f"mesh.{form}"
     report = report_of(job, rows, path)
     write_collected(job, pieces, path)
     made = TiledMesh(path, report, job)
     if deck is not None:
-        write_mesh_file(made.mesh(), Path(deck))
+        outputs.write_mesh_file(made.mesh(), Path(deck))
         report["deck"] = str(deck)
-    write_json(report, folder / "report.json")
+    outputs.write_json(report, folder / "report.json")
     return made

@@ -12,8 +12,8 @@ from .files import (
     write_run,
 )
 from .mesh_picture import draw_materials, material_colors
-from .report import build_report, element_notes
-from .rock_picture import draw_rock, rock_labels
+from .report import build_report, element_notes, versions
+from .rock_picture import draw_rock, rock_labels, small_pictures
 from .vtk_files import save_dataset, save_legacy, save_with_comment
 
 __all__ = [
@@ -31,6 +31,8 @@ __all__ = [
     "save_dataset",
     "save_legacy",
     "save_with_comment",
+    "small_pictures",
+    "versions",
     "write_boundaries",
     "write_json",
     "write_labels",

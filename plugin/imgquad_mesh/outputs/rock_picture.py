@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -40,6 +42,15 @@ def draw_rock() -> Image.Image:
     picture = Image.fromarray(rock_labels())
     picture.putpalette([value for color in PALETTE for value in color])  # the indices are the materials
     return picture
+
+
+def small_pictures(columns: int, rows: int) -> Iterator[NDArray[np.uint8]]:
+    """Give small pictures of a rock: labels, a photograph in grey, and colours."""
+    labels = rock_labels(columns, rows, grain=24)
+    yield labels
+    noise = np.random.default_rng(0).normal(0, 6, labels.shape)
+    yield (40 * labels + noise).clip(0, 255).astype(np.uint8)
+    yield np.asarray(draw_rock().convert("RGB").crop((0, 0, columns, rows)))
 
 
 def _grains(rng: np.random.Generator, x: NDArray[np.float64], y: NDArray[np.float64], grain: int) -> NDArray[np.uint8]:

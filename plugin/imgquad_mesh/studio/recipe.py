@@ -13,6 +13,7 @@ from imgquad_core.declared import declarations
 from imgquad_core.errors import InputError
 from imgquad_core.fe import ElementOptions
 from imgquad_core.options import MeshOptions
+from imgquad_mesh import meshlab
 from imgquad_mesh.spec import Value, filters
 from imgquad_mesh.texts import TEXTS, read_text, values_of, words_of
 
@@ -161,8 +162,6 @@ def _call(name: str, options: Any) -> str:
 
 def script(recipe: Recipe) -> str:
     """Return the filter script that does the same: `imgquad-mesh script FILE.mlx --input PICTURE`."""
-    from imgquad_mesh.meshlab.templates import filter_script
-
     mesh, export = filters()["generate_quad_mesh_from_image"], filters()["export_quad_mesh_to_file"]
     output = recipe.output
     given: dict[str, Any] = {e.name: getattr(output.elements, e.name) for e in fields(output.elements)}
@@ -173,4 +172,6 @@ def script(recipe: Recipe) -> str:
         for p in export.parameters
         if p.field in given
     }
-    return filter_script([mesh, export], {mesh.function: values_of(recipe.options, mesh), export.function: written})
+    return meshlab.templates.filter_script(
+        [mesh, export], {mesh.function: values_of(recipe.options, mesh), export.function: written}
+    )

@@ -67,8 +67,8 @@ class Worker:
 
 
 def _work(*arguments: Any) -> None:
-    """Be a worker; imported in the worker's process only, for the server needs no NumPy."""
-    from .worker import work
+    """Be a worker."""
+    from .worker import work  # not above: only the worker's process needs NumPy
 
     work(*arguments)
 
@@ -92,7 +92,7 @@ def _context() -> Any:
 def start_fork_server() -> None:
     """Let the process start that workers are forked from, and load the kernels: now, not at the first picture."""
     if sys.platform != "win32":
-        from multiprocessing.forkserver import ensure_running
+        from multiprocessing.forkserver import ensure_running  # there is none on Windows
 
         _context()
         ensure_running()

@@ -311,7 +311,7 @@ TASKS: Mapping[str, Callable[[Desk, Mapping[str, Any], Tell], Answer]] = {
 def _limit_memory(bytes_: int) -> None:
     """Let the process have so much data, so that too large a picture is a `MemoryError` and not the machine's end."""
     try:
-        import resource
-    except ImportError:  # Windows
+        import resource  # there is none on Windows
+    except ImportError:
         return
     resource.setrlimit(resource.RLIMIT_DATA, (bytes_, bytes_))
