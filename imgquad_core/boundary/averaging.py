@@ -29,10 +29,9 @@ from imgquad_core.jit import kernel, verb
 from imgquad_core.model import BoundaryGraph, PointKind
 
 from .areas import enclosed_areas
-from .curves import ELSEWHERE, PIXEL_CORNER, Curves, Ends, PixelChains, curves_of, numbered, per_point
+from .curves import ELSEWHERE, PIXEL_CORNER, Curves, Ends, PixelChains, curves_of, numbered, per_point, rings
 from .edge_sizes import grade_along
 from .feature_size import local_feature_size
-from .joins import rings
 from .nodes import divide
 
 _BELL = 1.05  # of the width, deviation of the bell

@@ -223,3 +223,18 @@ def started_at(curves: Curves, flags: Flags) -> tuple[Curves, Flags]:
     raw = curves.raw[order]
     turned = curves._replace(raw=raw, arc=arc_lengths(raw, curves.offsets), weight=curves.weight[order])
     return turned._replace(scale=curves.scale[order]), flags[order]
+
+
+def rings(raw: Floats, offsets: Ints, node_offsets: Ints, sockets: Ints) -> tuple[Ints, Ints]:
+    """Return the next socket round its node for each socket, and one socket of each node."""
+    chain, is_end = sockets // 2, sockets % 2 == 1
+    at = np.where(is_end, offsets[chain + 1] - 1, offsets[chain])
+    step = raw[np.where(is_end, at - 1, at + 1)] - raw[at]
+    node = np.repeat(np.arange(len(node_offsets) - 1), np.diff(node_offsets))
+    turn = np.arctan2(step[:, 1], step[:, 0])
+    order = sockets[np.lexsort((turn, node))]
+    ring = np.full(2 * (len(offsets) - 1), -1, np.int64)
+    following = np.roll(order, -1)
+    following[node_offsets[1:] - 1] = order[node_offsets[:-1]]
+    ring[order] = following
+    return ring, order[node_offsets[:-1]]

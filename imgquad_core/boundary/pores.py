@@ -22,8 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from imgquad_core.arrays import Floats, Ints
 from imgquad_core.model import VOID, BoundaryGraph
 
-from .curves import curves_of
-from .joins import rings
+from .curves import curves_of, rings
 
 
 class Pores(NamedTuple):
