@@ -1,4 +1,4 @@
-"""How pictures are read, segmented and freed of noise."""
+"""How pictures are segmented, edited and freed of noise; how they are read: `imgquad_core.reading.options`."""
 
 from __future__ import annotations
 

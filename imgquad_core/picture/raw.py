@@ -12,7 +12,7 @@ from imgquad_core.jit import kernel, verb
 
 from .blends import find_rims, relabel_rims
 from .classes import Classes, classes_of
-from .constants import Constant, constants_of
+from .constant_values import Constant, constants_of
 from .exact_colours import dark_to_light
 from .levels import NOISY, Levels, filtered_strips, noise_of, squared_gradient
 from .quantisation import cielab, distances2, histogram_of
