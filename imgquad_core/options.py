@@ -47,6 +47,8 @@ class MeshOptions:
         Pixels whose material is known, from which materials grow.
     learn : bool
         Whether what looks like the marks is a mark, too.
+    no_data : float, optional
+        Number of pixels that hold nothing, where the file does not say so.
     fill_void : int
         Void clusters of at most so many pixels go to the material around.
     merge : mapping of (str or int, ...) to str
@@ -125,6 +127,7 @@ class MeshOptions:
     flatten: str = same_as(SegmentationOptions, "flatten")
     marks: Any = same_as(SegmentationOptions, "marks")
     learn: bool = same_as(SegmentationOptions, "learn")
+    no_data: float | None = same_as(SegmentationOptions, "no_data")
     fill_void: int = same_as(SegmentationOptions, "fill_void")
     merge: Mapping[tuple[str | int, ...], str] = same_as(EditOptions, "merge")
     rename: Mapping[str | int, str] = same_as(EditOptions, "rename")
@@ -269,6 +272,7 @@ class MeshOptions:
             flatten=self.flatten,
             marks=self.marks,
             learn=self.learn,
+            no_data=self.no_data,
             fill_void=self.fill_void,
             drop_transparent=self.drop_transparent,
         )

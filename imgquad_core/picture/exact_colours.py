@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from imgquad_core.arrays import Bytes, Flags, Ints, Labels
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, LabelImage, Materials
-from imgquad_core.reading.picture import Picture
+from imgquad_core.reading.picture import Picture, either
 
 from .codes import codes_of, numbered, put_in_place, values_of_codes
 from .flat_colours import without_blends
@@ -67,9 +67,12 @@ def exact_labels(picture: Picture, most: int, void: Flags | None, with_blends: b
 
 def with_minus_one(values: NDArray[Any], void: Flags | None) -> Flags | None:
     """Return void pixels with those of -1, which stands for no material in signed numbers."""
-    if values.ndim == 3 or values.dtype.kind not in "if" or not (values.min() == VOID and _whole(values)):
+    if values.ndim == 3 or values.dtype.kind not in "if":
         return void
-    return np.asarray(values == VOID if void is None else void | (values == VOID))
+    held = values if void is None else values[~void]
+    if held.size == 0 or held.min() != VOID or not _whole(held):
+        return void
+    return either(void, np.asarray(values == VOID))
 
 
 def _whole(values: NDArray[Any]) -> bool:
@@ -86,7 +89,8 @@ def materials_of_codes(picture: Picture, codes: NDArray[Any]) -> tuple[Labels, M
     low, high = int(values.min()), int(values.max())
     if low < 0 or high > np.iinfo(np.int32).max:
         raise InputError(
-            f"{picture.name} holds labels from {low} to {high}: give numbers from 0 to 2147483647 (-1 is void)"
+            f"{picture.name} holds labels from {low:.10g} to {high:.10g}: give numbers from 0 to 2147483647 (-1 is"
+            f" void), or, if it stands for no data, no_data = {low if low < 0 else high:.10g}"
         )
     labels = values.astype(np.int32)
     order = np.argsort(labels, kind="stable")  # bits of floats are in the order of the numbers, but wide integers wrap

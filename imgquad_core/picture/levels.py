@@ -18,6 +18,10 @@ from .total_variation import total_variation
 
 #: part of the pixels at each end that may leave the range of levels
 OUTLIERS = 0.0001
+#: share of the pixels with which a number far from all others is told, and is no outlier of these
+FAR_SHARE = 0.001
+#: levels within which those of its pixels stay that the filter draws towards their surroundings
+END = 20.0
 #: pixels that are looked at for the range and for noise
 ENOUGH = 1_000_000
 #: times the noise between neighbours that it is between every second pixel: from which it is correlated, at most
@@ -49,6 +53,8 @@ class Levels:
         Whether the surface divides the values (light, the coil of a scanner) or is taken off (a background).
     shift, shrink : float
         What is taken off then, and what the rest is divided by, to lie in 0 to 255.
+    ends : tuple of (float or None)
+        Numbers of many pixels far below and far above all others, which are levels 0 and 255; None: there is none.
     """
 
     values: NDArray[Any]
@@ -59,6 +65,7 @@ class Levels:
     is_gain: bool = False
     shift: float = 0.0
     shrink: float = 1.0
+    ends: tuple[float | None, float | None] = (None, None)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -98,6 +105,9 @@ class Levels:
 
     def value_of(self, level: float) -> float:
         """Return the value, as stored, of a level."""
+        for end, reached in zip(self.ends, (level < END, level > 255.0 - END), strict=True):
+            if end is not None and reached:
+                return end
         return self.low + self.step * (level * self.shrink + self.shift)
 
 
@@ -127,8 +137,10 @@ def levels_of(picture: Picture, void: Flags | None) -> Levels:
             return Levels(filled(np.ascontiguousarray(rgb), void), void=void)
         values = rgb[..., 0]
     values = filled(values[..., None], void)
-    low, step = (0.0, 1.0) if values.dtype == np.uint8 else _range(values[..., 0])
-    return Levels(values, low, step, void)
+    if values.dtype == np.uint8:
+        return Levels(values, void=void)
+    low, step, ends = _range(values[..., 0])
+    return Levels(values, low, step, void, ends=ends)
 
 
 def filled(values: NDArray[Any], void: Flags | None) -> NDArray[Any]:
@@ -139,10 +151,18 @@ def filled(values: NDArray[Any], void: Flags | None) -> NDArray[Any]:
     return np.asarray(values[r, c])
 
 
-def _range(values: NDArray[Any]) -> tuple[float, float]:
-    """Return the value of level 0 and the step, so that neither outliers nor single hot pixels take the range."""
+def _range(values: NDArray[Any]) -> tuple[float, float, tuple[float | None, float | None]]:
+    """Return the value of level 0, the step, and the numbers far from all others.
+
+    Neither outliers nor single hot pixels nor far numbers take the range.
+    """
     every = max(1, values.size // ENOUGH)
     part = values[::every].astype(np.float64)
+    ends = _far_below(part), _far_below(-part)
+    ends = ends[0], None if ends[1] is None else -ends[1]
+    for end in ends:
+        if end is not None:
+            part = np.where(part == end, np.median(part[part != end]), part)
     low, high = np.quantile(part, (OUTLIERS, 1.0 - OUTLIERS))
     if min(part.shape) >= 3:
         # what medians of three along rows and columns leave is no single pixel
@@ -151,7 +171,19 @@ def _range(values: NDArray[Any]) -> tuple[float, float]:
         # noise ends within one span of them, hot pixels do not
         low = low if low >= inner_low - span else inner_low - span / 4.0
         high = high if high <= inner_high + span else inner_high + span / 4.0
-    return float(low), float(high - low) / 255.0 or 1.0
+    margin = (high - low) / 4.0  # between the level of far numbers and all others
+    low, high = low - margin * (ends[0] is not None), high + margin * (ends[1] is not None)
+    return float(low), float(high - low) / 255.0 or 1.0, ends
+
+
+def _far_below(part: Floats) -> float | None:
+    """Return the least number if many pixels hold it, and it is farther from all others than these are from another."""
+    least = float(part.min())
+    others = part[part != least]
+    if part.size - others.size < FAR_SHARE * part.size or others.size == 0:
+        return None
+    low, high = float(others.min()), float(np.quantile(others, 1.0 - FAR_SHARE))
+    return least if low - least > high - low > 0.0 else None
 
 
 def _middle(values: NDArray[Any]) -> NDArray[Any]:

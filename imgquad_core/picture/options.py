@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import sqrt
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any
 
 from imgquad_core.declared import POLICY, Declaration, check, option
@@ -32,6 +32,8 @@ class SegmentationOptions:
         Pixels whose material is known, from which materials grow; see `imgquad_core.picture.marks.marks_of`.
     learn : bool
         Whether what looks like the marks for sure is a mark, too (needs scikit-learn).
+    no_data : float, optional
+        Number that stands for nothing where the file does not say so (-9999, 255): its pixels are void.
     fill_void : int
         Void clusters (not indexed, NaN, masked, nodata, -1) of at most so many pixels go to the material with the
         longest common border. 0: void stays void, and is not meshed.
@@ -62,6 +64,12 @@ class SegmentationOptions:
     learn: bool = option(
         False, "let a random forest learn from the marks what else is marked for sure (scikit-learn)", topic="picture"
     )
+    no_data: float | None = option(
+        None,
+        "number of pixels that hold nothing, where the file does not say so (-9999, 255): they are void",
+        what="a number",
+        topic="picture",
+    )
     fill_void: int = option(
         0,
         "void clusters (not indexed, NaN, masked, nodata, -1) of at most so many pixels go to the material with the "
@@ -77,10 +85,16 @@ class SegmentationOptions:
     def __post_init__(self) -> None:
         check(self)
         _check_colors(self.colors)
+        _check_no_data(self.no_data)
         if self.marks is not None and self.colors != "auto":
             raise InputError(f"colors is {self.colors}, but marks name the materials: give one of them")
         if self.learn and self.marks is None:
             raise InputError("learn is on, but there are no marks to learn from: give marks")
+
+
+def _check_no_data(given: Any) -> None:
+    if given is not None and (isinstance(given, bool) or not isinstance(given, Real)):
+        raise InputError(f"no_data is {given!r}; give a number")
 
 
 def _check_colors(colors: Any) -> None:

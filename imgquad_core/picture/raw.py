@@ -129,7 +129,8 @@ def find_classes(levels: Levels, number: int | None = None, flatten: bool = True
     means = choice.classes.means
     tails: list[float] = []
     if number is None and levels.is_grey:
-        tails = tails_of(choice.smooth.plane[..., 0], choice.smooth.support, np.sort(means[:, 0]), noise)
+        fixed = np.logical_or.reduce([constant.pixels for constant in constants]) if constants else None
+        tails = tails_of(choice.smooth.plane[..., 0], choice.smooth.support, np.sort(means[:, 0]), noise, fixed)
     means = np.concatenate([means, np.reshape(tails, (-1, 1))]) if tails else means
     means = means[_by_light(means)]
     return _labelled(choice, means, constants, noise, len(tails))

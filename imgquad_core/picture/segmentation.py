@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from imgquad_core.arrays import Flags, Floats
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, LabelImage, Materials
-from imgquad_core.reading.picture import Picture, picture_of
+from imgquad_core.reading.picture import Picture, either, picture_of, where_equal
 
 from .classes import APART
 from .exact_colours import ANY_NUMBER, exact_labels, with_minus_one
@@ -143,10 +143,13 @@ def _found(picture: Picture, options: SegmentationOptions, void: Flags | None) -
 
 def void_of(picture: Picture, options: SegmentationOptions) -> Flags | None:
     """Return the pixels that hold nothing or are transparent, None where there are none."""
+    void = picture.void
+    if options.no_data is not None:
+        void = either(void, where_equal(picture.values, float(options.no_data)))
     if not options.drop_transparent or picture.opaque is None:
-        return picture.void
-    void = ~picture.opaque if picture.void is None else ~picture.opaque | picture.void
-    if void.all():
+        return void
+    void = either(void, ~picture.opaque)
+    if void is not None and void.all():
         raise InputError(f"{picture.name} is wholly transparent: keep transparent pixels (drop_transparent=False)")
     return void
 
@@ -189,7 +192,7 @@ def _divided(
     """Divide a raw picture in classes: so many as are far apart, or the number asked for (`kind` is None)."""
     number = None if kind is not None else int(options.colors)  # type: ignore[arg-type]
     found = find_classes(levels_of(picture, void), number, options.flatten == "auto")
-    warnings = () if kind is None else doubts_of(kind) + overlap_of(found) + _grains(found)
+    warnings = () if kind is None else doubts_of(kind) + _far(found) + overlap_of(found) + _grains(found)
     return _told(found, void, warnings)
 
 
@@ -204,6 +207,14 @@ def _told(found: Found, void: Flags | None, warnings: tuple[str, ...]) -> Segmen
         labels[void] = VOID
     image = LabelImage(labels, materials_of_classes(found))
     return Segmentation(image, True, found.method, found.noise, found.rims, details_of(found), warnings)
+
+
+def _far(found: Found) -> tuple[str, ...]:
+    """Say so where many pixels hold one number that is far from all others."""
+    ends = [f"{end:.8g}" for end in found.levels.ends if end is not None]
+    return tuple(
+        f"many pixels hold {end}, far from all others: if that stands for no data, give no_data = {end}" for end in ends
+    )
 
 
 def _grains(found: Found) -> tuple[str, ...]:

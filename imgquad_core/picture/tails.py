@@ -22,7 +22,9 @@ PIXELS, SHARE = 16, 0.001
 AROUND = 3
 
 
-def tails_of(plane: Bytes, support: Flags, means: Floats, noise: float) -> list[float]:
+def tails_of(
+    plane: Bytes, support: Flags, means: Floats, noise: float, constant: Flags | None = None
+) -> list[float]:
     """Return the mean levels of phases darker than the darkest class and brighter than the brightest.
 
     Parameters
@@ -35,7 +37,12 @@ def tails_of(plane: Bytes, support: Flags, means: Floats, noise: float) -> list[
         Mean levels of the classes, ascending.
     noise : float
         Standard deviation of the noise in levels.
+    constant : bool, shape (n_rows, n_cols), optional
+        Pixels of constant values: what is beside them may be blurred towards them, and is no phase.
     """
+    from scipy.ndimage import binary_dilation
+
+    free = None if constant is None else ~binary_dilation(constant, iterations=AROUND)
     weights = np.bincount(plane[support], minlength=256).astype(float)
     nearest = np.abs(np.arange(256.0)[:, None] - means[None]).argmin(axis=1)
     gap = OF_GAP * float(np.diff(means).min()) if len(means) > 1 else 0.0
@@ -46,7 +53,7 @@ def tails_of(plane: Bytes, support: Flags, means: Floats, noise: float) -> list[
         far = min(OWN * deviation, _valley(*upwards, deviation))
         least = max(far, OF_NOISE * noise, gap, 1.0)
         beyond = plane < middle - least if side < 0 else plane > middle + least
-        level = _level_of(plane, beyond, support, middle)
+        level = _level_of(plane, beyond if free is None else beyond & free, support, middle)
         if level is not None:
             found.append(level)
     return found

@@ -8,12 +8,12 @@ from __future__ import annotations
 import re
 from typing import Any, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags
 
 from .calibration import Calibration, size_of
+from .picture import where_equal
 
 #: EPSG codes of units of length that maps use
 _UNITS = {9001: "m", 9002: "ft", 9003: "us-ft", 9036: "km"}
@@ -102,14 +102,3 @@ def no_data(page: Any, values: NDArray[Any]) -> Flags | None:
     except ValueError:
         return None
     return where_equal(values, value)
-
-
-def where_equal(values: NDArray[Any], value: float) -> Flags | None:
-    """Return where pixels hold a number, in the precision of their type; None where none does."""
-    if values.dtype.kind in "iub":
-        same = values == int(value) if value.is_integer() else np.zeros(values.shape, bool)
-    else:
-        with np.errstate(over="ignore"):
-            same = np.isnan(values) if np.isnan(value) else values == values.dtype.type(value)
-    found = same if same.ndim == 2 else same.all(axis=2)
-    return found if found.any() else None

@@ -172,3 +172,21 @@ def _as_rgb(values: NDArray[Any], name: str) -> NDArray[Any]:
     if values.dtype.kind == "f":
         return np.asarray(np.rint(values * (255 if high <= 1 else 1)), np.uint8)
     return np.asarray(values, np.uint8 if high <= 255 else np.uint16)
+
+
+def either(first: Flags | None, second: Flags | None) -> Flags | None:
+    """Return where one of two masks is set; None is a mask that is set nowhere."""
+    if first is None or second is None:
+        return second if first is None else first
+    return first | second
+
+
+def where_equal(values: NDArray[Any], value: float) -> Flags | None:
+    """Return where pixels hold a number, in the precision of their type; None where none does."""
+    if values.dtype.kind in "iub":
+        same = values == int(value) if value.is_integer() else np.zeros(values.shape, bool)
+    else:
+        with np.errstate(over="ignore"):
+            same = np.isnan(values) if np.isnan(value) else values == values.dtype.type(value)
+    found = same if same.ndim == 2 else same.all(axis=2)
+    return found if found.any() else None

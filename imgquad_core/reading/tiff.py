@@ -20,7 +20,7 @@ from .decoding import Stack, assert_pixels, decoding, missing_extra, upright
 from .georeference import georeference, no_data
 from .options import ReadOptions
 from .packed import assert_tile
-from .picture import Picture, picture_of
+from .picture import Picture, either, picture_of
 from .pillow_images import read_by_pillow
 from .pixel_size import tiff_pixel_size
 
@@ -245,7 +245,7 @@ def _part(path: Path, file: Any, plane: Plane, options: ReadOptions, box: Box) -
     values = _tiles(path, file, page, box)
     picture = replace(_picture(plane, values, str(path)), window=box)
     if plane.mask is not None:
-        picture = replace(picture, void=_joined(picture.void, _tiles(path, file, plane.mask, box) == 0))
+        picture = replace(picture, void=either(picture.void, _tiles(path, file, plane.mask, box) == 0))
     placed = _placed(picture, file, plane)
     told = f"read {right - left} x {lower - upper} of {width} x {height} pixels"
     return replace(placed, calibration=placed.calibration.cropped(box, height), notes=(told, *placed.notes))
@@ -304,7 +304,7 @@ def _picture(plane: Plane, values: NDArray[Any], name: str) -> Picture:
     turned, notes = _channels(plane, turned, name)
     void = no_data(page, turned)
     picture = picture_of(_without(turned, void), name)
-    return replace(picture, void=_joined(picture.void, void), notes=(*picture.notes, *notes))
+    return replace(picture, void=either(picture.void, void), notes=(*picture.notes, *notes))
 
 
 def _channels(plane: Plane, values: NDArray[Any], name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
@@ -318,8 +318,9 @@ def _channels(plane: Plane, values: NDArray[Any], name: str) -> tuple[NDArray[An
     if samples == 1:
         return values, ()
     if samples == colours + len(extra) and samples <= 4 and (has_alpha or not extra):
-        if page.is_shaped and page.planarconfig == 2 and not extra:
-            return values, ("three planes taken as red, green and blue: if they are slices, give channel 0, 1 or 2",)
+        if page.is_shaped and page.planarconfig == 2:  # so tifffile stores 3 or 4 slices, too
+            what = "three planes taken as red, green and blue" if samples == 3 else "the fourth plane taken as alpha"
+            return values, (f"{what}: if they are slices, give channel 0 to {samples - 1}",)
         return values, ()
     if colours == 3 and samples == 4:
         return values[..., :3], ("the fourth channel is no alpha and is left aside: channel 3 takes it",)
@@ -342,16 +343,10 @@ def _without(values: NDArray[Any], void: Flags | None) -> NDArray[Any]:
     return filled
 
 
-def _joined(first: Flags | None, second: Flags | None) -> Flags | None:
-    if first is None or second is None:
-        return second if first is None else first
-    return first | second
-
-
 def _with_void(picture: Picture, mask: NDArray[Any], orientation: int) -> Picture:
     """Make void what a mask page says is not valid."""
     outside = upright(mask == 0, orientation)
-    return replace(picture, void=_joined(picture.void, outside)) if outside.any() else picture
+    return replace(picture, void=either(picture.void, outside)) if outside.any() else picture
 
 
 def _placed(picture: Picture, file: Any, plane: Plane) -> Picture:

@@ -320,6 +320,7 @@ TEXTS: Mapping[str, Text] = {
         "drop",
         str,
     ),
+    "no_data": Text(_none_or(number, ""), _write_or(_write_numbers, ""), "VALUE", "Empty: none."),
     "frame": Text(_none_or(whole, ""), _write_or(str, ""), "N", "Empty: there is one only."),
     "channel": Text(_none_or(whole, ""), _write_or(str, ""), "N", "Empty: there is one only."),
     "scalars": Text(_none_or(str, ""), _write_or(str, ""), "NAME", "Empty: the one that is most likely meant."),

@@ -91,4 +91,6 @@ def to_image(picture: Picture) -> pv.ImageData:
 
 
 def _upwards(values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype == np.float16:  # VTK has none
+        values = values.astype(np.float32)
     return np.ascontiguousarray(values[::-1]).reshape(-1, *values.shape[2:])

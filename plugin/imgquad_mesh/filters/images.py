@@ -42,6 +42,7 @@ def segment(
     flatten: Flatten = "auto",
     marks: Marks = None,
     learn: bool = False,
+    no_data: float | None = None,
     fill_void: int = 0,
     drop_transparent: bool = False,
     progress_bar: bool = False,
@@ -66,6 +67,8 @@ def segment(
         row first, or points, shape (n, 4): x and y in pixels from the upper left corner, radius, material.
     learn : bool, default: False
         Let a random forest learn from the marks what else is marked for sure (scikit-learn).
+    no_data : float, optional
+        Number of pixels that hold nothing (-9999, 255): they are void.
     fill_void : int, default: 0
         Void clusters (NaN, -1) of at most so many pixels go to the material with the longest common border.
     drop_transparent : bool, default: False
@@ -91,7 +94,7 @@ def segment(
     >>> image.imgquad.segment().field_data["material_numbers"]
     pyvista_ndarray([  0, 200], dtype=int32)
     """
-    values = checked(colors=colors, flatten=flatten, learn=learn, fill_void=fill_void)
+    values = checked(colors=colors, flatten=flatten, learn=learn, no_data=no_data, fill_void=fill_void)
     values |= checked(drop_transparent=drop_transparent)
     values |= _marked(image, scalars, marks)
     with progress_of(progress_bar) as begin:
@@ -300,6 +303,7 @@ def mesh(
     flatten: Flatten = "auto",
     marks: Marks = None,
     learn: bool = False,
+    no_data: float | None = None,
     fill_void: int = 0,
     min_pixels: int | Auto = "auto",
     min_length: float | Auto = "auto",
@@ -352,6 +356,8 @@ def mesh(
         Pixels whose material is known, from which materials grow, see `segment`.
     learn : bool, default: False
         Let a random forest learn from the marks what else is marked for sure (scikit-learn).
+    no_data : float, optional
+        Number of pixels that hold nothing (-9999, 255): they are void.
     fill_void : int, default: 0
         Void clusters (NaN, -1) of at most so many pixels go to the material with the longest common border.
     min_pixels, min_length : float | "auto", default: "auto"
@@ -436,7 +442,7 @@ def mesh(
     values |= checked(threads=threads, triangulator=triangulator, periodic=periodic)
     values |= checked(min_pixels=min_pixels, min_length=min_length, drop=drop)
     values |= checked(merge=merge, rename=rename, recolor=recolor)
-    early = checked(colors=colors, flatten=flatten, learn=learn, fill_void=fill_void)
+    early = checked(colors=colors, flatten=flatten, learn=learn, no_data=no_data, fill_void=fill_void)
     early |= checked(drop_transparent=drop_transparent)
     early |= _marked(image, scalars, marks)
     placement = datasets.image_placement(image, scalars)

@@ -209,6 +209,7 @@ _OWN: Mapping[str, Callable[[Any, str], Any]] = {
     "keep": _materials,
     "colors": _colors,
     "marks": _marks,
+    "no_data": lambda value, name: None if value is None else _number(value, name),
     "merge": _merges,
     "rename": _new_names,
     "recolor": _new_colors,

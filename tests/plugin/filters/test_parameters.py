@@ -70,6 +70,7 @@ NONSENSE_TEXTS: dict[str, list[Any]] = {
     "keep": [3, [1.5], ["gold"], [77], None],
     "marks": [3, [[1, 2]], [[[1]]]],
     "threads": ["x", float("nan"), 2.5, -1, [1, 2]],
+    "no_data": ["x", float("nan"), float("inf"), [1], {}],
     "fill_void": ["x", -1, 2.5, float("nan"), None],
     "frame_size": ["x", -1, 0, float("nan"), [1]],
     "sizes_between": ["x", 3, {1: 2}, {(0, 1): -1}, {(0, 1): "x"}, {(0, 77): 1}, {("gold", 0): 1}],

@@ -31,7 +31,7 @@ export function setOption(name, value, what = "") {
   else options[name] = value;
   change({ options, ...(SEGMENTING.includes(name) ? { edits: START.edits } : {}) }, what);
 }
-const SEGMENTING = ["colors", "flatten", "frame", "channel", "level", "scalars", "info_bar", "grain_angle"];
+const SEGMENTING = ["colors", "flatten", "no_data", "frame", "channel", "level", "scalars", "info_bar", "grain_angle"];
 
 export const edit = (parts) => change({ edits: { ...now.edits, ...parts } });
 export const setOutput = (parts) => change({ output: { ...now.output, ...parts } });
