@@ -23,7 +23,7 @@ from imgquad_core.mesher.efforts import EFFORTS
 from imgquad_core.model import QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import run
-from support.invariants import assert_simplified_mesh, assert_valid_mesh
+from support.invariants import assert_accounted, assert_simplified_mesh, assert_valid_mesh
 from support.labels import KINDS, Labels, label_image, labels_of_kind
 
 SIZES = (1.0, 2.5, 6.0)
@@ -76,6 +76,7 @@ def mesh_case(case: Case, effort: str, seconds: dict[str, float]) -> QuadMesh:
     image = label_image(case.labels())
     done = run(image, case.options(effort))
     start = time.perf_counter()
+    assert_accounted(done)
     if done.options.tolerance == 0.0 and done.step == (1.0, 1.0) and done.options.join in (None, 0.0):
         assert_valid_mesh(done.mesh, image)
     else:

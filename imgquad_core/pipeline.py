@@ -293,11 +293,12 @@ def extract_simplified(
     Returns
     -------
     BoundaryGraph
-        Of `absorbed.enlarged`; the pixels of a region are those of what it is the rest of, which smoothing restores.
+        Of `absorbed.enlarged`; the pixels of a region are those of what it is the rest of, which smoothing restores;
+        in noisy pictures its own.
     """
     enlarged = drop_materials(absorbed.enlarged, drop)
     graph = extract(enlarged, options)
-    if not absorbed.materials:
+    if not absorbed.materials or absorbed.is_noisy:
         return graph
     before = enlarged_labels(clean.labels, absorbed.times)
     areas = areas_of_origin(before, enlarged.labels, corner_rule(options.policy, options.step))

@@ -35,7 +35,7 @@ EFFORTS: Mapping[str, Effort] = {
 class Tuning(NamedTuple):
     """Numbers of the mesher that studies settled: handed down, so that a test or the next study can ask for others."""
 
-    worst: float = 0.5  #: scaled Jacobian below which the boundary's edges at a quad are halved, if that helps
+    worst: float = 0.55  #: scaled Jacobian below which the boundary's edges at a quad are halved, if that helps
     wishes: int = 3  #: rounds of halving for the sake of poor quads, at most
     rounds: int = 16  #: rounds of halving in all, at most: those after the wishes are for folded quads
     very_wide: float = 6.0  #: width of a face that is meshed on stride 6, in its coarse segments

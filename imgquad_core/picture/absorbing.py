@@ -37,7 +37,7 @@ BLUNT = 0.5  # width of the bell over the radius, where outlines are rounded
 TILE = 64  # px, of the picture at once
 BELL_ENDS = 3.0  # widths
 SPECKS, FAR = 0.02, 0.75  # share of the picture that is farther than that many tolerances from what stays: it is noisy
-BALANCES, POWER = 8, 0.7  # rounds in which weights are set, and how far at once
+BALANCES, POWER, CALMER = 12, 0.7, 0.85  # rounds in which weights are set, how far at once, and how far in the next
 MOST_BYTES = 2_000_000_000  # of densities; a picture with more is flooded
 DIAGONAL = np.sqrt(2.0)
 
@@ -69,6 +69,7 @@ class Absorbed(NamedTuple):
     enlarged: LabelImage  #: what is meshed: enlarged `times`
     times: int
     materials: tuple[Absorption, ...]  #: none where nothing was asked for
+    is_noisy: bool = False  #: materials were given places by their density: regions are the rest of nothing
 
 
 def absorb_thin(image: LabelImage, options: AbsorbOptions) -> Absorbed:
@@ -91,11 +92,11 @@ def absorb_thin(image: LabelImage, options: AbsorbOptions) -> Absorbed:
         return Absorbed(image, image, 1, ())
     before = enlarged_labels(image.labels, times)
     radius, rule = 0.5 * options.tolerance * times, corner_rule(options.policy, options.step * times)
-    after = _absorbed(before, np.isin(before, [VOID, *options.keep]), radius, rule)
+    after, is_noisy = _absorbed(before, np.isin(before, [VOID, *options.keep]), radius, rule)
     middle = after[times // 2 :: times, times // 2 :: times]
     enlarged = LabelImage(after, image.materials)
     small = enlarged if times == 1 else LabelImage(middle, image.materials)
-    return Absorbed(small, enlarged, times, _accounts(before, after, times, options))
+    return Absorbed(small, enlarged, times, _accounts(before, after, times, options), is_noisy)
 
 
 def widest_part(image: LabelImage) -> float:
@@ -146,20 +147,23 @@ def _roots(parent: Ints) -> Ints:
         parent = above
 
 
-def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> Labels:
+def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[Labels, bool]:
+    """Absorb what is thin; also tell whether the picture is noisy."""
+    is_noisy = False
     for attempt in range(ROUNDS):
         kept = _kept(labels, stays, radius, rule)
         if kept.all() or not (kept & (labels != VOID)).any():
             break
         new, gone = flood(labels, kept)
         if attempt == 0 and np.mean(gone > FAR * 2.0 * radius) > SPECKS:
+            is_noisy = True
             labels = _balanced(labels, stays, radius)
             kept = _kept(labels, stays, radius, rule)
             if kept.all() or not (kept & (labels != VOID)).any():
                 break
             new, gone = flood(labels, kept)
         labels = rounded(new, (new != labels) & ~stays, stays, radius, BLUNT * radius)
-    return labels
+    return labels, is_noisy
 
 
 def _kept(labels: Labels, stays: Flags, radius: float, rule: int) -> Flags:
@@ -454,7 +458,10 @@ def _density(
 
 
 def _balanced(labels: Labels, stays: Flags, width: float) -> Labels:
-    """Give each pixel to the material that is densest around it, with weights that leave each its area."""
+    """Give each pixel to the material that is densest around it, with weights that leave each its area.
+
+    Where densities are flat a little more weight takes all of them: the weights whose areas are nearest count.
+    """
     materials, number = np.unique(labels[labels != VOID], return_counts=True)
     if 4 * len(materials) * labels.size > MOST_BYTES or len(materials) < 2:
         return labels
@@ -462,16 +469,16 @@ def _balanced(labels: Labels, stays: Flags, width: float) -> Labels:
         [gaussian_filter((labels == m).astype(np.float32), width, truncate=BELL_ENDS) for m in materials]
     )
     free = ~stays
-    weight = np.ones(len(materials), np.float32)
-    for _ in range(BALANCES):
+    held = np.array([np.count_nonzero(stays & (labels == m)) for m in materials])
+    weight, best, least = np.ones(len(materials), np.float32), np.zeros(labels.shape, np.int64), np.inf
+    for power in POWER * CALMER ** np.arange(BALANCES):
         winner = (density * weight[:, None, None]).argmax(axis=0)
-        present = np.bincount(winner[free], minlength=len(materials)) + [
-            np.count_nonzero(stays & (labels == m)) for m in materials
-        ]
-        weight *= ((number / np.maximum(present, 1)) ** POWER).astype(np.float32)
+        present = np.bincount(winner[free], minlength=len(materials)) + held
+        if (off := np.abs(present - number).sum()) < least:
+            best, least = winner, off
+        weight *= ((number / np.maximum(present, 1)) ** power).astype(np.float32)
         weight /= weight.max()
-    winner = (density * weight[:, None, None]).argmax(axis=0)
-    return np.where(free, materials[winner], labels).astype(np.int32)
+    return np.where(free, materials[best], labels).astype(np.int32)
 
 
 def _accounts(before: Labels, after: Labels, times: int, options: AbsorbOptions) -> tuple[Absorption, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any
 
@@ -17,7 +18,7 @@ from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import VOID, LabelImage, QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import run
-from support.invariants import assert_simplified_mesh, assert_valid_mesh
+from support.invariants import assert_accounted, assert_simplified_mesh, assert_valid_mesh
 from support.labels import KINDS, Labels, label_image, labels_of_kind, spiral, voronoi
 
 SIZES = (1.0, 2.5, 6.0)
@@ -101,22 +102,36 @@ def test_extremes(labels: Any, size: float, triangulator: str) -> None:
     valid_mesh(label_image(labels), size, triangulator=triangulator)
 
 
-@settings(bounded, max_examples=30)
+@st.composite
+def simplifications(draw: st.DrawFn) -> MeshOptions:
+    """Steps, joins and tolerances of every kind; a material is kept, perhaps."""
+    return MeshOptions(
+        size=draw(st.sampled_from(SIZES)),
+        effort="fast",
+        step=draw(st.sampled_from(("auto", 1.0, 2.0, 2.6, (3.0, 2.0)))),
+        join=draw(st.sampled_from((None, 0.0, 3.0, 8.0))),
+        tolerance=draw(st.sampled_from((0.0, 1.0, 2.5, 4.0, 7.0, 12.0))),
+    )
+
+
+@settings(bounded, max_examples=40)
 @given(
     pictures(),
-    st.sampled_from(SIZES),
-    st.sampled_from(("auto", 1.0, 2.0, 2.6, (3.0, 2.0))),
-    st.sampled_from((None, 0.0, 3.0, 8.0)),
-    st.sampled_from((0.0, 1.0, 2.5, 4.0, 7.0, 12.0)),
+    simplifications(),
     st.integers(1, 3),
     st.integers(0, 3),
+    st.booleans(),
+    st.permutations(range(N_COLORS)),
+    st.booleans(),
 )
 def test_any_step_join_and_tolerance_gives_a_valid_mesh(
-    labels: Labels, size: float, step: Any, join: float | None, tolerance: float, times: int, turns: int
+    labels: Labels, options: MeshOptions, times: int, quarters: int, mirror: bool, colors: list[int], keep: bool
 ) -> None:
-    labels = np.rot90(np.repeat(np.repeat(labels, times, axis=0), times, axis=1), turns)
-    options = MeshOptions(size=size, effort="fast", step=step, join=join, tolerance=tolerance)
-    done = run(label_image(labels), options)
+    recolored = np.append(colors, VOID).astype(np.int32)[labels]
+    turned = np.rot90(recolored[:, ::-1] if mirror else recolored, quarters)
+    image = label_image(np.repeat(np.repeat(turned, times, axis=0), times, axis=1))
+    done = run(image, replace(options, keep=(int(turned.max()),) if keep else ()))
+    assert_accounted(done)
     assert_simplified_mesh(done.mesh, done.labels)
 
 

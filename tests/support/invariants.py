@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.model import VOID, LabelImage, PointKind, QuadMesh
+from imgquad_core.pipeline import Run
 
 Array = NDArray[Any]
 
@@ -45,6 +46,24 @@ def assert_simplified_mesh(mesh: QuadMesh, labels: LabelImage) -> None:
         x, y = p[..., 0], p[..., 1]
         area = 0.5 * ((x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0]))
         assert np.isclose(area.sum(), solid.size, rtol=1e-9)
+
+
+def assert_accounted(done: Run) -> None:
+    """Fail unless every material is meshed or named as absorbed, and what is lost and gained adds up."""
+    solid = done.clean.labels[done.clean.labels != VOID]
+    was, now = np.unique(solid), np.unique(done.mesh.quad_material)
+    gone = {row.material for row in done.absorbed if row.lost == row.pixels and row.absorbed == row.regions}
+    assert set(was.tolist()) == set(now.tolist()) | gone
+    assert gone.isdisjoint(now.tolist())
+    for row in done.absorbed:
+        assert row.pixels == np.count_nonzero(solid == row.material)
+        assert 0 <= row.absorbed <= row.regions
+        assert 0 <= row.lost <= row.pixels
+        assert row.absorbed == 0 or row.lost > 0
+        if row.material in done.options.keep:
+            assert row.lost == 0
+    lost, gained = (sum(getattr(row, name) for row in done.absorbed) for name in ("lost", "gained"))
+    assert abs(lost - gained) <= len(done.absorbed)  # an enlarged picture has parts of pixels
 
 
 def assert_arrays(mesh: QuadMesh) -> None:
