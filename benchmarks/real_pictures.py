@@ -103,6 +103,7 @@ class Judged(NamedTuple):
     picture: str
     size: float
     tolerance: float
+    triangulator: str = "auto"
 
 
 def judged_runs(pictures: Path, only: Iterable[str]) -> Iterator[tuple[Path, Judged]]:
@@ -136,7 +137,8 @@ def judged(picture: Path, run: Judged, folder: Path) -> dict[str, Any]:
     """Mesh a picture by the command, in this process; return what the judge and the report say."""
     mesh, labels, report = folder / "mesh.vtu", folder / "labels.npy", folder / "mesh.json"
     crop = ["--crop", CROPPED[run.picture]] if run.picture in CROPPED else []
-    options = ["--size", run.size, "--tolerance", run.tolerance, "--labels-out", labels, "--report", report, *crop]
+    options = ["--size", run.size, "--tolerance", run.tolerance, "--triangulator", run.triangulator, *crop]
+    options += ["--labels-out", labels, "--report", report]
     before = resource.getrusage(resource.RUSAGE_SELF).ru_utime
     if code := command(["run", *map(str, [picture, mesh, "--quiet", *options])]):
         return {"failed": f"exit code {code}"}

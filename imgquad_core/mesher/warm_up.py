@@ -10,6 +10,7 @@ import numpy as np
 @cache
 def compile_last_stages() -> None:
     """Compile the optimisation of quads, or load it, by using it on one."""
+    # not above: the second process sees to it first that it ends with the first one
     from imgquad_core.cleanup.faces import FaceQuads
     from imgquad_core.cleanup.irregular_nodes import clean_up
     from imgquad_core.cleanup.options import CleanUp

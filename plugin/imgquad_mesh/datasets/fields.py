@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 NUMBERS, NAMES, COLORS = MATERIAL_FIELDS = ("material_numbers", "material_names", "material_colors")
 #: of grains: phase and Bunge's Euler angles (degrees, NaN where unknown) of each
-PHASES, ORIENTATIONS = CRYSTAL_FIELDS = ("material_phases", "material_orientations")
+PHASES, ORIENTATIONS = ("material_phases", "material_orientations")
 
 
 def put_materials(dataset: Any, materials: Materials) -> None:
