@@ -52,8 +52,9 @@ class Legend(Value):
         Of shades: the classes, in levels, from dark to light; empty for labels.
     constant : bool, shape (m,)
         Which of them are constant values.
-    low, step, noise : float
-        Value of level 0, difference of a level to the next, and standard deviation of the noise in levels.
+    low, step, noise, weight : float
+        Value of level 0, difference of a level to the next, standard deviation of the noise in levels, and weight of
+        the filter in these.
     quantised : bool
         Whether shades were divided in classes or blends given away: the default of noise removal hangs on it.
     note : str
@@ -72,6 +73,7 @@ class Legend(Value):
     low: float
     step: float
     noise: float
+    weight: float
     quantised: bool
     note: str
     warnings: tuple[str, ...]
@@ -226,6 +228,7 @@ def _of_labels(sample: Picture, tally: Tally, options: SegmentationOptions) -> L
         low=0.0,
         step=1.0,
         noise=0.0,
+        weight=0.0,
         quantised=blends > 0,
         note=f"{len(materials.labels)} materials in all, exact{told}",
         warnings=warnings if options.colors == "auto" else (),
@@ -252,6 +255,7 @@ def _of_shades(sample: Picture, options: SegmentationOptions) -> Legend:
         low=levels.low,
         step=levels.step,
         noise=known.noise,
+        weight=known.weight,
         quantised=True,
         note=f"{len(materials.labels)} materials in all, by {found.method} of a sample{details_of(found)}",
         warnings=overlap_of(found) if colors == "auto" else (),
@@ -260,7 +264,7 @@ def _of_shades(sample: Picture, options: SegmentationOptions) -> Legend:
 
 def _shaded(picture: Picture, legend: Legend) -> Labels:
     levels = levels_of(picture, picture.void)
-    known = Known(legend.means, legend.constant, legend.noise)
+    known = Known(legend.means, legend.constant, legend.noise, legend.weight)
     try:
         return find_known(replace(levels, low=legend.low, step=legend.step), known)
     except ValueError as error:

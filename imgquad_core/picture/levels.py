@@ -30,8 +30,9 @@ CORRELATED, MOST_FARTHER = 1.3, 2.5
 STRIP, OVERLAP = 1 << 22, 64
 #: noise (standard deviation, in levels) from which a picture is filtered
 NOISY = 0.5
-#: weight of the total variation filter, in standard deviations of the noise
-WEIGHT = 2.0
+#: weight of the total variation filter, in standard deviations of the noise: the usual one, and a light one, which
+#: leaves more noise and more of the contrast of what is one or two pixels thin
+WEIGHT, LIGHT = 2.0, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,10 +239,10 @@ class Strip(NamedTuple):
     place: slice  #: its own rows in the picture
 
 
-def filtered_strips(levels: Levels, noise: float) -> Iterator[Strip]:
+def filtered_strips(levels: Levels, noise: float, weight: float = WEIGHT) -> Iterator[Strip]:
     """Give strips of a picture with its noise taken away.
 
-    Total variation with a weight of two standard deviations, the channels each by itself. Pictures above `STRIP` pixels
+    Total variation with a weight in standard deviations, the channels each by itself. Pictures above `STRIP` pixels
     are filtered in strips that overlap.
     """
     rows, cols = levels.shape
@@ -249,16 +250,16 @@ def filtered_strips(levels: Levels, noise: float) -> Iterator[Strip]:
     for first in range(0, rows, height):
         last = min(first + height, rows)
         start, end = max(first - OVERLAP, 0), min(last + OVERLAP, rows)
-        strip = without_noise(levels.rows(start, end), noise)
+        strip = without_noise(levels.rows(start, end), noise, weight)
         yield Strip(strip, slice(first - start, last - start), slice(first, last))
 
 
-def without_noise(shades: Singles, noise: float) -> Singles:
+def without_noise(shades: Singles, noise: float, weight: float = WEIGHT) -> Singles:
     """Return levels after total variation filtering; as they are below `NOISY`."""
     if noise < NOISY:
         return shades
     planes = (np.ascontiguousarray(shades[..., k]) for k in range(shades.shape[2]))
-    return np.stack([total_variation(plane, WEIGHT * noise) for plane in planes], axis=2)
+    return np.stack([total_variation(plane, weight * noise) for plane in planes], axis=2)
 
 
 def squared_gradient(shades: Singles) -> Singles:

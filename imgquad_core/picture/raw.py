@@ -14,7 +14,7 @@ from .blends import find_rims, relabel_rims
 from .classes import Classes, classes_of
 from .constant_values import Constant, constants_of
 from .exact_colours import dark_to_light
-from .levels import NOISY, Levels, filtered_strips, noise_of, squared_gradient
+from .levels import LIGHT, NOISY, WEIGHT, Levels, filtered_strips, noise_of, squared_gradient
 from .quantisation import cielab, distances2, histogram_of
 from .shading import shade_of
 from .tails import tails_of
@@ -26,8 +26,10 @@ SLOPE, OF_COLOUR = 2.0, 1.7
 #: ... of greys without noise: the feet of blurred edges are no class beside the grey that they rise to
 FOOT = 1.0
 #: shading is taken out if it ranges over more standard deviations of the noise, and separates as many classes so much
-#: better, or more classes than before
-SHADED, BETTER, BETTER_AND_MORE = 2.0, 1.25, 1.1
+#: better, or more classes than before, or one class less, which was no phase but the uneven light of another
+SHADED, BETTER, BETTER_AND_MORE, BETTER_AND_FEWER = 2.0, 1.25, 1.1, 3.0
+#: the light filter counts if it separates as many classes so much better
+CLEARER = 1.15
 #: constants count if at least so much of the picture is flat beside them
 LEFT = 0.05
 #: levels by which a constant may differ from picture to picture
@@ -42,6 +44,7 @@ class Smooth(NamedTuple):
     plane: Bytes  #: (n_rows, n_cols, n_channels)
     rims: Flags  #: blends of two sides
     support: Flags  #: neither rims nor on slopes: what classes are judged by
+    weight: float = WEIGHT  #: of the filter, in standard deviations of the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,14 +125,15 @@ def find_classes(levels: Levels, number: int | None = None, flatten: bool = True
     See `imgquad_core.picture.segmentation.segment` for the steps.
     """
     constants, noise, smooth = _without_constants(levels, number)
+    fixed = np.logical_or.reduce([constant.pixels for constant in constants]) if constants else None
     wanted = None if number is None else number - len(constants)
     choice = _chosen(levels, smooth, wanted)
     if flatten and levels.is_grey and not constants:
         choice = _flattened(choice, noise, wanted)
+    choice = _clearer(choice, noise, wanted, fixed)
     means = choice.classes.means
     tails: list[float] = []
     if number is None and levels.is_grey:
-        fixed = np.logical_or.reduce([constant.pixels for constant in constants]) if constants else None
         tails = tails_of(choice.smooth.plane[..., 0], choice.smooth.support, np.sort(means[:, 0]), noise, fixed)
     means = np.concatenate([means, np.reshape(tails, (-1, 1))]) if tails else means
     means = means[_by_light(means)]
@@ -167,11 +171,12 @@ class Known(NamedTuple):
     means: Floats  #: (n_classes, 1 or 3), from dark to light
     constant: Flags  #: (n_classes,) which of them are constant values
     noise: float
+    weight: float  #: of the filter
 
 
 def known_classes(found: Found) -> Known:
     """Return the classes of a picture, for others of the same thing."""
-    return Known(found.means, found.constant, found.noise)
+    return Known(found.means, found.constant, found.noise, found.smooth.weight)
 
 
 def find_known(levels: Levels, known: Known) -> Labels:
@@ -182,7 +187,7 @@ def find_known(levels: Levels, known: Known) -> Labels:
     ValueError
         The picture has colours, the classes are grey.
     """
-    smooth = smoothed(levels, known.noise, None)
+    smooth = smoothed(levels, known.noise, None, known.weight)
     in_color = known.means.shape[1] == 3
     if levels.is_grey and in_color:
         smooth = smooth._replace(plane=np.repeat(smooth.plane, 3, axis=2))
@@ -200,13 +205,13 @@ def find_known(levels: Levels, known: Known) -> Labels:
     return np.asarray(np.array(order, np.int32)[labels], np.int32)
 
 
-def smoothed(levels: Levels, noise: float, without: Flags | None) -> Smooth:
+def smoothed(levels: Levels, noise: float, without: Flags | None, weight: float = WEIGHT) -> Smooth:
     """Take noise away and tell rims and slopes from what is flat; pixels `without` and void are no support."""
     plane = np.empty((*levels.shape, levels.values.shape[2]), np.uint8)
     gentle = np.empty(levels.shape, np.bool_)
     drawn = levels.is_grey and noise < NOISY
     bound = FOOT if drawn else max(SLOPE, noise) * (1.0 if levels.is_grey else OF_COLOUR)
-    for strip in filtered_strips(levels, noise):
+    for strip in filtered_strips(levels, noise, weight):
         plane[strip.place] = np.rint(np.clip(strip.shades[strip.own], 0.0, 255.0))
         gentle[strip.place] = squared_gradient(strip.shades)[strip.own] <= bound**2
     rims = find_rims(plane, RIM + min(noise, RIM_OF_NOISE))
@@ -214,7 +219,7 @@ def smoothed(levels: Levels, noise: float, without: Flags | None) -> Smooth:
     for pixels in (levels.void, without):
         if pixels is not None:
             support &= ~pixels
-    return Smooth(plane, rims, support)
+    return Smooth(plane, rims, support, weight)
 
 
 def _chosen(levels: Levels, smooth: Smooth, number: int | None) -> Choice:
@@ -226,15 +231,32 @@ def _chosen(levels: Levels, smooth: Smooth, number: int | None) -> Choice:
 
 
 def _flattened(choice: Choice, noise: float, number: int | None) -> Choice:
-    """Return the choice without shading, where that separates no fewer classes clearly better."""
+    """Return the choice without shading, where that separates the classes clearly better."""
     shade = shade_of(choice.levels, choice.smooth.plane[..., 0], noise, choice.levels.void)
     if shade is None or shade.span <= SHADED * noise:
         return choice
     flat = choice.levels.without_shade(shade.coefficients, shade.is_gain)
     other = _chosen(flat, smoothed(flat, noise, None), number)
     n, n_before = len(other.classes.means), len(choice.classes.means)
-    factor = BETTER if n == n_before else BETTER_AND_MORE
-    return other if n >= n_before and other.classes.separation > factor * _apart(choice, n) else choice
+    if n < n_before:
+        is_better = n == n_before - 1 and other.classes.separation > BETTER_AND_FEWER * choice.classes.separation
+    else:
+        factor = BETTER if n == n_before else BETTER_AND_MORE
+        is_better = other.classes.separation > factor * _apart(choice, n)
+    return other if is_better else choice
+
+
+def _clearer(choice: Choice, noise: float, number: int | None, without: Flags | None) -> Choice:
+    """Return the choice by the light filter, where that separates as many classes clearly better.
+
+    The filter takes twice its weight over their width from the contrast of thin phases: then its classes are nearer
+    to each other than what is left of the noise makes them.
+    """
+    if noise < NOISY:
+        return choice
+    other = _chosen(choice.levels, smoothed(choice.levels, noise, without, LIGHT), number)
+    is_same = len(other.classes.means) == len(choice.classes.means)
+    return other if is_same and other.classes.separation > CLEARER * choice.classes.separation else choice
 
 
 def _apart(choice: Choice, n: int) -> float:

@@ -22,9 +22,7 @@ PIXELS, SHARE = 16, 0.001
 AROUND = 3
 
 
-def tails_of(
-    plane: Bytes, support: Flags, means: Floats, noise: float, constant: Flags | None = None
-) -> list[float]:
+def tails_of(plane: Bytes, support: Flags, means: Floats, noise: float, constant: Flags | None = None) -> list[float]:
     """Return the mean levels of phases darker than the darkest class and brighter than the brightest.
 
     Parameters
