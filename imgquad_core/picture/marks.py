@@ -26,6 +26,8 @@ MOST = 64
 SURE = 0.75
 #: scales of the features that the forest learns from, pixels, and rows of overlap that they need
 SCALES, OVERLAP = (1.0, 16.0), 64
+#: share of the gradient that is taken as it is, and scale of that beside it, pixels
+FINE, COARSE = 0.5, 1.5
 #: pixels whose features are made at once: 60 features of 4 bytes each
 STRIP = 1 << 20
 
@@ -138,9 +140,11 @@ def grow_from(levels: Levels, marks: Marks, learn: bool = False) -> LabelImage:
 
     Notes
     -----
-    Watershed (Beucher and Meyer 1993) of the gradient of the picture without noise, from the marks. On a photograph of
-    five minerals between crossed polars, 5 strokes a mineral give an adjusted Rand index of about 0.5, 30 strokes 0.6;
-    no method without marks came above 0.2.
+    Watershed (Beucher and Meyer 1993) of the gradient of the picture without noise, from the marks: half of the
+    gradient as it is, which keeps what is thin, and all of that at a scale of 1.5 pixels, which runs past texture. On a
+    photograph of five minerals between crossed polars, 5 strokes a mineral at random places give an adjusted Rand index
+    of 0.35 (0.24 to 0.41; without the second scale 0.32), in large grains up to 0.5, 30 strokes 0.6; no method without
+    marks came above 0.2.
     """
     markers = marks.labels + 1  # 0: none
     if levels.void is not None:
@@ -153,11 +157,15 @@ def grow_from(levels: Levels, marks: Marks, learn: bool = False) -> LabelImage:
 
 
 def _gradient(levels: Levels) -> Singles:
-    """Return the gradient's length, all channels together, of the picture without noise."""
+    """Return the gradient's length at two scales, added, all channels together, of the picture without noise."""
+    from scipy.ndimage import gaussian_filter
+
     noise = noise_of(levels)
     found = np.empty(levels.shape, np.float32)
     for strip in filtered_strips(levels, noise):
-        found[strip.place] = np.sqrt(squared_gradient(strip.shades)[strip.own])
+        coarse = gaussian_filter(strip.shades, (COARSE, COARSE, 0.0))
+        both = FINE * np.sqrt(squared_gradient(strip.shades)) + np.sqrt(squared_gradient(coarse))
+        found[strip.place] = both[strip.own]
     return found
 
 
