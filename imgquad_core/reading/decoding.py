@@ -25,6 +25,7 @@ EXTRAS = {
     "zarr": "zarr",
     "hdf5": "h5py",
     "dicom": "pydicom",
+    "lif": "liffile",
 }
 
 

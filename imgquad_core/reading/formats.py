@@ -16,6 +16,7 @@ from .dicom import PREAMBLE, read_dicom
 from .ebsd_maps import read_ang, read_ctf
 from .hdf5_files import read_hdf5
 from .info_bar import cut_info_bar
+from .leica import read_lif
 from .numpy_files import read_npy, read_npz
 from .options import ReadOptions
 from .picture import Picture, picture_of
@@ -53,6 +54,7 @@ FORMATS = (
     Format("NRRD", (".nrrd", ".nhdr"), read_nrrd, "nrrd"),
     Format("NIfTI", (".nii", ".nii.gz"), read_nifti, "nifti"),
     Format("DICOM", (".dcm", ".dicom", ".ima"), read_dicom, "dicom"),
+    Format("Leica LIF", (".lif",), read_lif, "lif"),
     Format("MRC", (".mrc", ".mrcs", ".map", ".rec", ".st"), read_mrc, "mrc"),
 )  # fmt: skip
 
@@ -64,8 +66,7 @@ CONVERTED_BY: Mapping[str, str] = {
     ".cpr": "export the map as .ctf (Channel 5: Save as; AZtec: Export)",
     ".crc": "export the map as .ctf (Channel 5: Save as; AZtec: Export)",
     ".osc": "export the map as .ang from OIM Analysis (File, Export, Scan data)",
-    ".czi": "pip install czifile, then tifffile.imwrite('x.tif', czifile.imread(FILE).squeeze())",
-    ".lif": "pip install liffile, then numpy.save('x.npy', liffile.LifFile(FILE).images[0].asarray())",
+    ".czi": "pip install czifile imagecodecs, then numpy.save('x.npy', czifile.imread(FILE).squeeze())",
     ".dm3": "pip install rosettasciio, then numpy.save('x.npy', rsciio.digitalmicrograph.file_reader(FILE)[0]['data'])",
     ".dm4": "pip install rosettasciio, then numpy.save('x.npy', rsciio.digitalmicrograph.file_reader(FILE)[0]['data'])",
     ".emd": "pip install rosettasciio, then numpy.save('x.npy', rsciio.emd.file_reader(FILE)[0]['data'])",
@@ -210,7 +211,7 @@ def _first_bytes(path: Path) -> bytes:
 
 
 #: a few more, for messages
-_OTHERS = ("npy", "npz", "ang", "ctf", "h5oina", "dream3d", "zarr", "nrrd", "nii", "mrc", "dcm", "vti", "mha")
+_OTHERS = ("npy", "npz", "ang", "ctf", "h5oina", "dream3d", "zarr", "nrrd", "nii", "mrc", "lif", "dcm", "vti", "mha")
 
 
 def _by_name(extension: str) -> Format | None:

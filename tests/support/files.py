@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -242,3 +243,41 @@ def assert_read_or_refused(path: Path) -> bool:
     assert "\n" not in told, told
     assert path.name in told, told
     return False
+
+
+def write_lif(path: Path, images: dict[str, NDArray[Any]], step: float = 1e-7) -> Path:
+    """Write pictures, shape (n_channels, n_slices, n_rows, n_cols), uint8, as Leica does: XML, then the memory."""
+
+    def dimension(axis: int, n: int, stride: int) -> str:
+        text = f'DimID="{axis}" NumberOfElements="{n}" Origin="0" Length="{step * (n - 1)!r}" Unit="m"'
+        return f'<DimensionDescription {text} BitInc="0" BytesInc="{stride}"/>'
+
+    def element(name: str, values: NDArray[Any], k: int) -> str:
+        channels, slices, rows, cols = values.shape
+        size = values[0].size
+        told = "".join(
+            f'<ChannelDescription DataType="0" ChannelTag="0" Resolution="8" NameOfMeasuredQuantity="" Min="0"'
+            f' Max="255" Unit="" LUTName="Gray" IsLUTInverted="0" BytesInc="{c * size}" BitInc="0"/>'
+            for c in range(channels)
+        )
+        axes = dimension(1, cols, 1) + dimension(2, rows, cols) + dimension(3, slices, rows * cols)
+        image = f"<Channels>{told}</Channels><Dimensions>{axes}</Dimensions>"
+        return (
+            f'<Element Name="{name}" Visibility="1" CopyOption="1" UniqueID="{k}"><Data><Image TextDescription="">'
+            f"<ImageDescription>{image}</ImageDescription></Image></Data>"
+            f'<Memory Size="{values.size}" MemoryBlockID="MemBlock_{k}"/></Element>'
+        )
+
+    def text(content: str) -> bytes:
+        return b"\x2a" + struct.pack("<I", len(content)) + content.encode("utf-16-le")
+
+    def block(content: bytes) -> bytes:
+        return struct.pack("<II", 0x70, len(content)) + content
+
+    inside = "".join(element(name, values, k) for k, (name, values) in enumerate(images.items()))
+    head = f'<Element Name="a.lif"><Children>{inside}</Children><Memory Size="0" MemoryBlockID=""/></Element>'
+    content = block(text(f'<LMSDataContainerHeader Version="2">{head}</LMSDataContainerHeader>'))
+    for k, values in enumerate(images.values()):
+        content += block(b"\x2a" + struct.pack("<Q", values.size) + text(f"MemBlock_{k}")) + values.tobytes()
+    path.write_bytes(content)
+    return path

@@ -16,7 +16,7 @@ from PIL import Image
 
 from imgquad_core.errors import InputError
 from imgquad_core.reading.formats import CONVERTED_BY, ReadOptions, read_picture
-from support.files import PLANE, VOLUME, write_dream3d, write_nifti, write_nrrd, write_oina, write_ome
+from support.files import PLANE, VOLUME, write_dream3d, write_lif, write_nifti, write_nrrd, write_oina, write_ome
 
 
 def size_text(path: Path, **options: Any) -> str | None:
@@ -243,6 +243,38 @@ def test_an_archive_of_arrays(tmp_path: Path) -> None:
     np.savez_compressed(tmp_path / "bomb.npz", labels=np.zeros(400_000_000, np.uint8).reshape(20000, 20000))
     with pytest.raises(InputError, match="raise"):
         read_picture(tmp_path / "bomb.npz", ReadOptions(max_pixels=10_000))
+
+
+# --------------------------------------------------------------------------------------------------- Leica
+
+
+def test_a_plane_of_one_of_the_pictures_of_a_lif_file(tmp_path: Path) -> None:
+    pytest.importorskip("liffile")
+    stack = np.stack([VOLUME, 199 - VOLUME]).astype(np.uint8)
+    path = write_lif(tmp_path / "a.lif", {"first": stack, "second": stack[:1, :1]})
+    with pytest.raises(InputError, match="first, second"):
+        read_picture(path)
+    with pytest.raises(InputError, match=r"3 planes.*channel = 0 to 1|channel = 0 to 1"):
+        read_picture(path, ReadOptions(scalars="first", frame=1))
+    found = read_picture(path, ReadOptions(scalars="first", frame=1, channel=1))
+    assert (found.values == 199 - PLANE).all()
+    assert "plane 1 of 3" in found.notes[0]
+    assert size_text(path, scalars="second") == "100 nm"
+    assert (read_picture(path, ReadOptions(scalars="second")).values == VOLUME[0]).all()
+    with pytest.raises(InputError, match="more than max_pixels"):
+        read_picture(path, ReadOptions(scalars="second", max_pixels=10))
+
+
+def test_a_lif_file_that_is_cut_off_or_promises_too_much_is_a_one_line_error(tmp_path: Path) -> None:
+    pytest.importorskip("liffile")
+    path = write_lif(tmp_path / "a.lif", {"first": VOLUME[None].astype(np.uint8)})
+    whole = path.read_bytes()
+    large = whole.replace(*(f'NumberOfElements="{n}"'.encode("utf-16-le") for n in ("30", "99")))
+    for content in (large, *(whole[:n] for n in (4, 9, 60, 400, len(whole) - 900, len(whole) - 5))):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"a\.lif") as told:
+            read_picture(path, ReadOptions(frame=2))
+        assert "\n" not in str(told.value)
 
 
 # ------------------------------------------------------------------------------------------- other formats

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import tifffile
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw
 from scipy.spatial import cKDTree
 
 import imgquad_mesh
@@ -291,6 +291,22 @@ def test_sem_pictures_tell_their_bar_and_their_pixel_size(
     assert picture.calibration.size is not None
     assert picture.calibration.size.text == size
     assert imgquad_mesh.read(samples / name).spacing[0] == pytest.approx(float(size.split()[0]), rel=1e-4)
+
+
+@pytest.mark.parametrize("ink", [0, 255])
+def test_a_scale_that_is_drawn_into_a_micrograph_is_told_where_it_is(tmp_path: Path, ink: int) -> None:
+    image = Image.fromarray(shades(3).clip(5, 250).astype(np.uint8))
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((210, 222, 270, 226), fill=ink)
+    draw.text((225, 205), "20 um", fill=ink)
+    image.save(tmp_path / "a.png")
+    assert read_any(tmp_path / "a.png").notes == (
+        "rows 222 to 226, columns 210 to 270 look like a drawn scale, which is meshed: crop it",
+    )
+    clipped = save_png(tmp_path / "b", shades(3, -20, 270).clip(0, 255).astype(np.uint8))
+    assert read_any(clipped).notes == ()
+    drawing = save_png(tmp_path / "c", (grains(60) % 6 * 40).astype(np.uint8))
+    assert read_any(drawing).notes == ()
 
 
 @pytest.mark.parametrize(("options", "size"), [
