@@ -6,6 +6,7 @@ lines through both sides meet. Chains are split there, so that smoothing leaves 
 Short sides are straight on a small circle, too: 6 px of a disc of radius 6 are off by 0.2 px (rms), no more than pixel
 stairs. So where the sides are no longer than that, a corner is what no circle fits. Measured: without this test half of
 the discs of radius 5 to 8 have corners; there circles leave 0.20 to 0.28 px, 95 of 100 corners of squares 0.32 or more.
+The others have a right angle between sides of 8.5 px, which are never straight on so small a circle.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ _TURN, _TIP = 0.8, 2.5  # radians, least and largest turn between the sides; bey
 _UNLIKE = 0.20  # px, least residual of one quadratic through both sides
 _UNROUND = 0.289  # px, least residual (rms) of one circle through short sides: 1 / sqrt(12), what pixel stairs leave
 _LONG = 12.0  # px; no circle is straight over two sides of this length and turns by `_TURN`
+_FAIR, _OFF_RIGHT = 8.0, 0.11  # px, and radians from a right angle within which sides of this length will do
 _FARTHEST = 2.0  # px from the pixel boundary
 _APART = 4.2  # px of arc between corners
 _WHOLE = 0.999  # least scale of a corner: where details are finer sides are too short to tell
@@ -62,7 +64,7 @@ def _place(curves: Curves, is_corner: Flags, room: Floats, lengths: Floats, poin
     for c in range(len(curves.ends)):
         for i in range(curves.offsets[c], curves.offsets[c + 1]):
             if is_corner[i]:
-                _, dx, dy, _ = _corner_at(curves, c, i, lengths)
+                _, dx, dy, _, _ = _corner_at(curves, c, i, lengths)
                 scale = min(1.0, room[i] / max(np.hypot(dx, dy), 1e-9))
                 points[i, 0], points[i, 1] = curves.raw[i, 0] + scale * dx, curves.raw[i, 1] + scale * dy
 
@@ -113,7 +115,7 @@ def _find(curves: Curves, lengths: Floats) -> Flags:
             continue
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
         for i in range(first + (curves.ends[c, 0] >= 0), last):
-            straight, dx, dy, _ = _corner_at(curves, c, i, lengths)
+            straight, dx, dy, _, _ = _corner_at(curves, c, i, lengths)
             if straight <= 0.0:
                 continue
             middle, _ = _gather(curves, c, i, beside)
@@ -123,15 +125,16 @@ def _find(curves: Curves, lengths: Floats) -> Flags:
                 score[j] = max(score[j], gain + straight)
         for i in range(first, last):
             if score[i] > 0.0 and _is_best(curves, c, i, score):
-                straight, _, _, side = _corner_at(curves, c, i, lengths)
+                straight, _, _, side, turn = _corner_at(curves, c, i, lengths)
                 _, n = _gather(curves, c, i, beside)
-                is_corner[i] = straight > 0.0 and (side >= _LONG or _off_circle(beside, n) >= _UNROUND)
+                is_told = side >= _LONG or (side >= _FAIR and abs(turn - 0.5 * np.pi) <= _OFF_RIGHT)
+                is_corner[i] = straight > 0.0 and (is_told or _off_circle(beside, n) >= _UNROUND)
     return is_corner
 
 
 @verb
-def _corner_at(curves: Curves, c: int, i: int, lengths: Floats) -> tuple[float, float, float, float]:
-    """How straight the sides of point i are (0: no corner), the shift to where their lines meet, their length.
+def _corner_at(curves: Curves, c: int, i: int, lengths: Floats) -> tuple[float, float, float, float, float]:
+    """How straight the sides of point i are (0: no corner), the shift to where their lines meet, their length and turn.
 
     The longest sides that are straight tell: lines through 6 px of pixel stairs are off by up to 6 degrees.
     """
@@ -140,16 +143,17 @@ def _corner_at(curves: Curves, c: int, i: int, lengths: Floats) -> tuple[float, 
         m, bx, by, vx, vy, rms_v = line_beside(curves, c, i, 1, _NEAR, lengths[k])
         is_straight = max(rms_u, rms_v) <= _STRAIGHT
         if k == 0 and (n < 6 or m < 6 or not is_straight or _turn(ux, uy, vx, vy) < _TURN):
-            return 0.0, 0.0, 0.0, 0.0
+            return 0.0, 0.0, 0.0, 0.0, 0.0
         if k > 0 and is_straight:
             break
-    if not _TURN <= _turn(ux, uy, vx, vy) <= _TIP:
-        return 0.0, 0.0, 0.0, 0.0
+    turn = _turn(ux, uy, vx, vy)
+    if not _TURN <= turn <= _TIP:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     t = ((bx - ax) * vy - (by - ay) * vx) / (ux * vy - uy * vx)
     x, y = ax + t * ux, ay + t * uy
     if not (x * x + y * y < _FARTHEST**2 and x * ux + y * uy < _AHEAD and x * vx + y * vy < _AHEAD):
-        return 0.0, 0.0, 0.0, 0.0
-    return 1.0 - max(rms_u, rms_v), x, y, lengths[k]
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    return 1.0 - max(rms_u, rms_v), x, y, lengths[k], turn
 
 
 @verb
