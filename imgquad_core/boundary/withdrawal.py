@@ -14,7 +14,7 @@ import numpy as np
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.chains import places_of
 from imgquad_core.errors import TopologyError
-from imgquad_core.geometry.conflicts import SHARP, UNITS, snapped
+from imgquad_core.geometry.conflicts import CROSSING, FREE, SHARP, UNITS, snapped
 from imgquad_core.model import Chains
 
 from .areas import mitres, restore_areas
@@ -177,27 +177,36 @@ def restore_areas_freely(
     max_shift : float
         Largest distance from the pixel boundary.
     gently : bool
-        Mind room and sectors too, as the nodes do.
+        All nodes keep room and sectors; else those that do go on to.
     """
     placed = nodes.placed
     chains = Chains(placed.offsets, nodes.chain_points, sides)
     bound = _area_bounds(draft.curves, nodes, room, max_shift)
     shift, tested = np.zeros(len(sides)), nodes.points
     had_conflicts = np.zeros(len(sides), bool)
+    levels = [(level, _excused(draft, nodes, level, gently)) for level in (level_of(nodes, 2), level_of(nodes, 1))]
     for attempt in range(_AREA_ROUNDS):
         points, shift = restore_areas(nodes.points, chains, areas, bound, shift)
         points = snapped(points, draft.units)
         has_moved = any_of_chain((points != tested).any(axis=1)[nodes.chain_points], placed.offsets)
         has_moved |= had_conflicts
         is_bad = np.zeros(len(points), bool)
-        for level in (level_of(nodes, 2), level_of(nodes, 1)):
-            marks = mark_conflicts(points, level, draft.ends, has_moved, gently, draft.shape, draft.units)
-            is_bad[level.segments[marks > 0]] = True
+        for level, is_excused in levels:
+            marks = mark_conflicts(points, level, draft.ends, has_moved, True, draft.shape, draft.units)
+            is_bad[level.segments[marks > np.where(is_excused, CROSSING - 1, FREE)]] = True
         if not is_bad.any():
             return nodes._replace(points=points)
         bound[_widened(is_bad[nodes.chain_points])] *= 0.5 if attempt == 0 else 0.0
         tested, had_conflicts = points, any_of_chain(is_bad[nodes.chain_points], placed.offsets)
     return nodes
+
+
+def _excused(draft: Draft, nodes: Nodes, level: Level, gently: bool) -> Flags:
+    """Tell which segments are too close to others or at too sharp sectors before areas are restored."""
+    if gently:
+        return np.zeros(len(level.segments), bool)
+    all_chains = np.ones(len(draft.curves.ends), bool)
+    return np.asarray(mark_conflicts(nodes.points, level, draft.ends, all_chains, True, draft.shape, draft.units) > 0)
 
 
 def _widened(flags: Flags) -> Flags:

@@ -14,7 +14,10 @@ from imgquad_core.boundary.options import SmoothingOptions
 from imgquad_core.boundary.smoothing import smooth_boundaries
 from imgquad_core.boundary.withdrawal import Draft, Patience, _least_segments, _with_neighbours, place_freely
 from imgquad_core.geometry.conflicts import UNITS, snapped
-from support.labels import label_image, voronoi
+from imgquad_core.measures.quality import scaled_jacobian
+from imgquad_core.options import MeshOptions
+from imgquad_core.pipeline import run
+from support.labels import label_image, labels_of_kind, voronoi
 
 
 def draft(push: float = 0.0, size: float = 3.0) -> Draft:
@@ -58,6 +61,20 @@ def test_with_no_patience_chains_have_the_points_of_the_pixels() -> None:
     at = nodes.placed.at
     assert at * 2 == pytest.approx(np.round(at * 2), abs=1e-9)
     assert nodes.points[nodes.chain_points] == pytest.approx(points_at(d.curves.raw, at), abs=1 / UNITS)
+
+
+@pytest.mark.parametrize(
+    ("shape", "n_colors", "seed", "options"),
+    [
+        ((24, 24), 8, 9100929, MeshOptions(size=2.5, step=1.0, join=8.0, tolerance=7.0)),
+        ((22, 24), 5, 9100629, MeshOptions(size=1.0, tolerance=4.0, keep=(4,))),
+    ],
+)
+def test_areas_make_no_sharp_sector_where_others_are_sharp_already(
+    shape: tuple[int, int], n_colors: int, seed: int, options: MeshOptions
+) -> None:
+    mesh = run(label_image(labels_of_kind("void", *shape, n_colors, seed)), options).mesh
+    assert scaled_jacobian(mesh.points, mesh.quads).min() > 0.45  # 0.15 and 0.27 where areas mind crossings only
 
 
 def test_faces_keep_three_coarse_segments() -> None:
