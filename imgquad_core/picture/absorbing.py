@@ -155,13 +155,16 @@ def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[L
         if kept.all() or not (kept & (labels != VOID)).any():
             break
         new, gone = flood(labels, kept)
+        stays = stays | (~kept & (gone == 0.0))  # between void pixels, with nothing in reach that is kept
         if attempt == 0 and np.mean(gone > FAR * 2.0 * radius) > SPECKS:
             is_noisy = True
             labels = _balanced(labels, stays, radius)
             kept = _kept(labels, stays, radius, rule)
             if kept.all() or not (kept & (labels != VOID)).any():
                 break
-            new, gone = flood(labels, kept)
+            new, _ = flood(labels, kept)
+        if attempt == ROUNDS - 1:
+            return new, is_noisy  # what rounding leaves thin may not be seen in the picture that is not enlarged
         labels = rounded(new, (new != labels) & ~stays, stays, radius, BLUNT * radius)
     return labels, is_noisy
 

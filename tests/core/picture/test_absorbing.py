@@ -14,6 +14,7 @@ from imgquad_core.picture import AbsorbOptions, absorb_thin, areas_of_origin
 from imgquad_core.picture.absorbing import distances, flood, near_core
 from imgquad_core.pipeline import run
 from imgquad_core.remedies import lost_materials
+from support.invariants import assert_accounted, assert_simplified_mesh
 from support.labels import any_labels, label_image, voronoi
 
 Labels = NDArray[np.int32]
@@ -76,6 +77,15 @@ def test_void_stays_void() -> None:
     labels[:, 10:12] = -1
     after = absorb_thin(label_image(labels), AbsorbOptions(8.0)).image.labels
     assert np.array_equal(after == -1, labels == -1)
+
+
+def test_what_is_thin_between_void_pixels_stays_as_it_is() -> None:
+    labels = np.array([[3, 3, 0, 1, 6, 6, 5, 1, 1, -1, 2, 2, 4, -1, -1, 2, 1, 7, 1, 1, 3, 5, -1, 6]], np.int32)
+    done = run(label_image(labels), MeshOptions(size=1.0, step=2.0, tolerance=4.0, keep=(7,)))
+    assert_accounted(done)
+    assert_simplified_mesh(done.mesh, done.labels)
+    assert np.array_equal(done.labels.labels[0, :15], labels[0, :15])
+    assert (done.labels.labels[0, 15:22] == 7).all()
 
 
 def test_a_picture_that_is_thin_all_over_keeps_a_material() -> None:
