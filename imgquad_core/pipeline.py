@@ -33,6 +33,7 @@ from .jit import share_on_disk
 from .mesher import MeshingOptions, mesh_boundaries
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .options import MeshOptions
+from .orientation import SQUARE_ON, TURNS, turn_of_graph, turn_of_image
 from .picture import (
     Absorbed,
     Absorption,
@@ -264,9 +265,11 @@ def segment_source(raw: Picture | LabelImage, options: SegmentationOptions | Non
 
 
 def extract(labels: LabelImage, options: ExtractionOptions | None = None) -> BoundaryGraph:
-    """Return the pixel boundary of a picture that has pixels to mesh."""
+    """Return the pixel boundary of a picture that has pixels to mesh; the order of all in it hangs on the content."""
     assert_solid(labels)
-    return extract_boundaries(labels, options)
+    options = options or ExtractionOptions()
+    turn = turn_of_image(labels, options.policy)
+    return turn.graph_back(extract_boundaries(turn.image(labels), options))
 
 
 def step_of(picture: LabelImage, step: Any, policy: str) -> Step:
@@ -300,8 +303,9 @@ def extract_simplified(
     graph = extract(enlarged, options)
     if not absorbed.materials or absorbed.is_noisy:
         return graph
-    before = enlarged_labels(clean.labels, absorbed.times)
-    areas = areas_of_origin(before, enlarged.labels, corner_rule(options.policy, options.step))
+    turn = turn_of_image(enlarged, options.policy)  # regions are numbered as they come there
+    before = np.ascontiguousarray(turn.picture(enlarged_labels(clean.labels, absorbed.times)))
+    areas = areas_of_origin(before, turn.image(enlarged).labels, corner_rule(options.policy, options.step))
     return replace(graph, region_pixels=np.rint(areas).astype(np.int64))
 
 
@@ -311,7 +315,9 @@ def smooth(
     """Return smooth boundaries cut into edges, in true shape, with opposite sides alike where they are periodic."""
     shape = graph.shape if true is None else true.shape
     _assert_feasible(shape, options.size)
-    graph = smooth_boundaries(graph, options, shape)
+    oblong = options.step != "auto" and len(set(as_step(options.step))) > 1  # width and height stay what they are
+    turn = turn_of_graph(graph, SQUARE_ON if oblong else TURNS)
+    graph = turn.graph_back(smooth_boundaries(turn.graph(graph), options, turn.shape(shape)))
     return match_opposite_sides(graph, periodic) if periodic != "none" else graph
 
 
@@ -319,15 +325,20 @@ def fill_boundaries(
     boundary: BoundaryGraph, options: MeshingOptions, materials: Materials, periodic: str = "none"
 ) -> tuple[BoundaryGraph, QuadMesh]:
     """Mesh; where the mesher has cut edges of one side of a periodic cell only, cut the other, too, and mesh anew."""
-    mesh = mesh_boundaries(boundary, options, materials)
+    mesh = _meshed(boundary, options, materials)
     for attempt in range(_MATCHES if periodic != "none" else 0):
         again = rematch(boundary, mesh, periodic)
         if again is None:
             break
         if attempt >= _MATCHES // 2:  # only what must be cut is: wishes of both sides may go on and on
             options = replace(options, tuning=options.tuning._replace(wishes=0))
-        boundary, mesh = again, mesh_boundaries(again, options, materials)
+        boundary, mesh = again, _meshed(again, options, materials)
     return boundary, mesh
+
+
+def _meshed(boundary: BoundaryGraph, options: MeshingOptions, materials: Materials) -> QuadMesh:
+    turn = turn_of_graph(boundary)
+    return turn.mesh_back(mesh_boundaries(turn.graph(boundary), options, materials), boundary.shape)
 
 
 class _Stopwatch:

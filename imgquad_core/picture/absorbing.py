@@ -25,6 +25,7 @@ from imgquad_core.arrays import Flags, Floats, Ints, Labels
 from imgquad_core.geometry.corner_rule import corner_rule
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage
+from imgquad_core.orientation import turn_of_image
 
 from .clusters import labelled_clusters
 from .options import AbsorbOptions
@@ -90,13 +91,16 @@ def absorb_thin(image: LabelImage, options: AbsorbOptions) -> Absorbed:
     times = int(np.clip(np.ceil(FINEST / max(options.tolerance, 1.0)), 1, MOST_TIMES))
     if not options.tolerance:
         return Absorbed(image, image, 1, ())
+    turn = turn_of_image(image, options.policy)
+    image = turn.image(image)
     before = enlarged_labels(image.labels, times)
     radius, rule = 0.5 * options.tolerance * times, corner_rule(options.policy, options.step * times)
     after, is_noisy = _absorbed(before, np.isin(before, [VOID, *options.keep]), radius, rule)
     middle = after[times // 2 :: times, times // 2 :: times]
     enlarged = LabelImage(after, image.materials)
     small = enlarged if times == 1 else LabelImage(middle, image.materials)
-    return Absorbed(small, enlarged, times, _accounts(before, after, times, options), is_noisy)
+    accounts = _accounts(before, after, times, options)
+    return Absorbed(turn.image_back(small), turn.image_back(enlarged), times, accounts, is_noisy)
 
 
 def widest_part(image: LabelImage) -> float:
