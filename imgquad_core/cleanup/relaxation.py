@@ -390,3 +390,27 @@ def _approach(points: Floats, rings: Rings, late: Flags, targets: Floats) -> Fla
             if late[v]:
                 _activate_ring(around, rings, v)
     return around
+
+
+@kernel
+def part(points: Floats, rings: Rings, free: Flags, share: float, floor: float) -> None:
+    """Move free nodes away from a neighbour that is nearer than `share` of their longest edge, in place.
+
+    Angles do not see how short a side is. No quad gets a scaled Jacobian below `floor` by it.
+    """
+    for v in range(len(points)):
+        if not free[v] or rings.offsets[v] == rings.offsets[v + 1]:
+            continue
+        shortest, longest = _reach_of(points, rings, v)
+        step, x, y = SHORT * longest, points[v, 0], points[v, 1]
+        while shortest < share * longest and step > TOLERANCE * longest:
+            need, best_x, best_y = min(guarded(points, rings, v), floor), x, y
+            for d in range(len(WAYS)):
+                points[v, 0], points[v, 1] = x + step * WAYS[d, 0], y + step * WAYS[d, 1]
+                reach, _ = _reach_of(points, rings, v)
+                if reach > shortest and is_sound(points, rings, v, need):
+                    shortest, best_x, best_y = reach, points[v, 0], points[v, 1]
+            points[v, 0], points[v, 1] = best_x, best_y
+            if best_x == x and best_y == y:
+                step *= 0.5
+            x, y = best_x, best_y

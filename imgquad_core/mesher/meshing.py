@@ -14,14 +14,15 @@ from dataclasses import replace
 import numpy as np
 
 from imgquad_core import ahead
-from imgquad_core.arrays import Flags, Labels
+from imgquad_core.arrays import Flags, Floats, Ints, Labels
 from imgquad_core.chains import without_unused_points
 from imgquad_core.cleanup.batches import in_threads
 from imgquad_core.cleanup.faces import FaceQuads, joined, stitched
 from imgquad_core.cleanup.options import Portions
-from imgquad_core.cleanup.relaxation import GOOD, newton, rings_of, untangle
+from imgquad_core.cleanup.relaxation import GOOD, GUARD, newton, part, rings_of, untangle
 from imgquad_core.cleanup.sliding import slide
 from imgquad_core.cleanup.strips import independent_nodes, strips_of
+from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.model import BoundaryGraph, Materials, PointKind, QuadMesh
 
 from .efforts import EFFORTS
@@ -30,6 +31,8 @@ from .outline import with_short_chains_halved
 from .refits import State, with_musts, with_wishes
 from .strides import LEAST_WIDTH, consistent, mesh_faces
 
+STUB = 0.1  # of the longest edge at a node: a shorter one is lengthened in the end
+LEAST = 0.5  # scaled Jacobian that is left by it, or the worst of the mesh where that is better
 FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60 degrees give .866
 
 
@@ -87,7 +90,16 @@ def _slid(mesh: QuadMesh, rounds: int, threads: int, portions: Portions) -> Quad
         slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
         move(lambda free: newton(points, rings, free, 2, GOOD))
     move(lambda free: untangle(points, rings, free, 4, FAIR))
+    floor = _worst(points, mesh.quads)
+    move(lambda free: part(points, rings, free, STUB, floor))
     return replace(mesh, points=points)
+
+
+def _worst(points: Floats, quads: Ints) -> float:
+    """Return the worst scaled Jacobian, within the limits that nodes may lower others to."""
+    worst = np.ones(1)
+    lower_to_worst(points, quads, np.zeros(len(quads), np.int64), worst)
+    return float(np.clip(worst[0], LEAST, GUARD))
 
 
 def _inner_nodes(mesh: QuadMesh, n_groups: int, portions: Portions) -> tuple[list[Flags], Flags]:

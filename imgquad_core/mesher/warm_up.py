@@ -14,7 +14,7 @@ def compile_last_stages() -> None:
     from imgquad_core.cleanup.faces import FaceQuads
     from imgquad_core.cleanup.irregular_nodes import clean_up
     from imgquad_core.cleanup.options import CleanUp
-    from imgquad_core.cleanup.relaxation import BAD, GOOD, fit_rim, laplace, newton, rings_of, untangle
+    from imgquad_core.cleanup.relaxation import BAD, GOOD, fit_rim, laplace, newton, part, rings_of, untangle
     from imgquad_core.cleanup.sliding import slide
     from imgquad_core.cleanup.worst_quads import repair
     from imgquad_core.geometry.quad_shape import lower_to_worst, sector_angles
@@ -35,6 +35,7 @@ def compile_last_stages() -> None:
     fit_rim(points, rings, none, points, 1)
     laplace(points, rings, none, 1)
     untangle(points, rings, none, 1, BAD)
+    part(points, rings, none, 0.1, 0.5)
     sector_angles(points, mesh.quads, none)
     lower_to_worst(points, mesh.quads, mesh.face, np.ones(1))
 

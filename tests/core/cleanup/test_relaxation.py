@@ -17,6 +17,7 @@ from imgquad_core.cleanup.relaxation import (
     fit_rim,
     laplace,
     newton,
+    part,
     ring_quality,
     rings_of,
     untangle,
@@ -102,6 +103,26 @@ def test_untangle_never_lowers_the_worst_quad(seed: int) -> None:
 def test_regular_grid_does_not_move(name: str) -> None:
     mesh = grid(6, 6)
     assert moved(mesh, MOVES[name]).tobytes() == mesh.points.tobytes()
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.5])
+def test_a_node_that_all_but_touches_another_is_parted_from_it(floor: float) -> None:
+    #      2---1
+    #     /     \     6, the middle of a hexagon, has edges to 0, 2 and 4,
+    #    3     6-0     and all but touches 0: all angles are fair
+    #     \     /
+    #      4---5
+    angle = np.arange(6) * np.pi / 3
+    points = np.append(np.stack([np.cos(angle), np.sin(angle)], axis=1), [[0.99, 0.0]], axis=0)
+    quads, free = np.array([[6, 0, 1, 2], [6, 2, 3, 4], [6, 4, 5, 0]]), np.arange(7) == 6
+    before = naive.worst_quality(points, quads)
+    part(points, rings_of(quads, 7), free, 0.1, floor)
+    lengths = np.hypot(*(points[6] - points[[0, 2, 4]]).T)
+    assert lengths.min() >= 0.1 * lengths.max()
+    assert naive.worst_quality(points, quads) >= min(before, floor)
+    rested = points.copy()
+    part(points, rings_of(quads, 7), free, 0.1, floor)
+    assert np.array_equal(points, rested), "long enough"
 
 
 def test_smoothing_brings_a_rough_grid_back() -> None:
