@@ -1,6 +1,7 @@
 """Files as instruments and programs write them: a test for each row of ../shared/design/inputs.md of severity 2 and 3.
 
 What is written here is written by the libraries that write such files. Rows of real files look for `../shared/samples`.
+Rows of packed bits, mask pages, missing codecs, colours of 16 bits: tests/core/reading, test_tiff.py and test_formats.py.
 """
 
 from __future__ import annotations
@@ -275,6 +276,23 @@ def test_a_whole_slide_is_cropped_without_decoding_it(tmp_path: Path) -> None:
     assert part.calibration.size.text == "0.499 um"
 
 
+def test_cogs_and_geotiffs_with_a_mask_are_one_picture_masked(tmp_path: Path, samples: Path) -> None:
+    path, inside = tmp_path / "a.tif", np.hypot(*np.mgrid[-120:120, -150:150]) < 110
+    with tifffile.TiffWriter(path) as file:
+        file.write((grains(60) % 9).astype(np.uint8), photometric="minisblack")
+        file.write(inside, photometric="mask", subfiletype=4)
+    assert (found_in(path).image.labels == np.where(inside, grains(60) % 9, -1)).all()
+    assert read_any(samples / "cogeo.tif").shape == (1024, 1024)
+
+
+def test_a_map_whose_rows_start_in_the_south_is_upright(tmp_path: Path) -> None:
+    matrix = [30.0, 0, 0, 5e5, 0, 30.0, 0, 4.6e6, 0, 0, 0, 0, 0, 0, 0, 1]
+    labels = (grains(60) % 9).astype(np.uint8)
+    picture = read_any(save_tif(extratags=[(34264, "d", 16, matrix, True)])(tmp_path / "a", labels))
+    assert (picture.values == labels[::-1]).all()
+    assert any("south" in note for note in picture.notes)
+
+
 # ---------------------------------------------------------------------------------------- sizes and info bars
 
 
@@ -312,6 +330,8 @@ def test_a_scale_that_is_drawn_into_a_micrograph_is_told_where_it_is(tmp_path: P
 @pytest.mark.parametrize(("options", "size"), [
     ({"imagej": True, "resolution": (1 / 0.1687, 1 / 0.1687), "metadata": {"unit": "um"}}, "0.1687 um"),
     ({"ome": True, "metadata": {"axes": "YX", "PhysicalSizeX": 0.65, "PhysicalSizeY": 0.65}}, "0.65 um"),
+    ({"extratags": [(65003, "s", 3, "um", True), (65004, "s", 3, "um", True), (65009, "d", 1, 0.1687, True),
+                    (65010, "d", 1, 0.1687, True)]}, "0.1687 um"),  # DigitalMicrograph's
     ({"resolution": (96, 96), "resolutionunit": "inch"}, None),  # a screen's: no millimetres from it
 ])  # fmt: skip
 def test_pixel_sizes_in_tags_are_told_and_those_of_screens_are_not(
@@ -335,6 +355,8 @@ READ_ROWS: Sequence[tuple[str, Any, dict[str, Any]]] = [
     ("ZSTD", np.uint16, {"compression": "zstd"}),
     ("LERC", np.uint16, {"compression": "lerc"}),
     ("JPEG-2000", np.uint8, {"compression": "jpeg2000", "compressionargs": {"level": 0}}),
+    ("JPEG-XL", np.uint8, {"compression": "jpegxl", "compressionargs": {"lossless": True}}),
+    ("PNG", np.uint16, {"compression": "png"}),
     ("64 bits", np.float64, {}),
     ("float16", np.float16, {}),
     ("MinIsWhite, 16 bits", np.uint16, {"photometric": "miniswhite"}),
@@ -343,7 +365,7 @@ READ_ROWS: Sequence[tuple[str, Any, dict[str, Any]]] = [
 
 @pytest.mark.parametrize(("row", "dtype", "options"), READ_ROWS, ids=[row[0] for row in READ_ROWS])
 def test_read_gives_what_was_written(tmp_path: Path, row: str, dtype: Any, options: dict[str, Any]) -> None:
-    if options.get("compression") in ("lzw", "zstd", "lerc", "jpeg2000"):
+    if options.get("compression") in ("lzw", "zstd", "lerc", "jpeg2000", "jpegxl", "png"):
         pytest.importorskip("imagecodecs")
     values = (grains(60) * (1 if dtype == np.uint8 else 7)).astype(dtype)
     values = np.dstack([values, values[::-1], values[:, ::-1]]) if options.get("photometric") == "rgb" else values
