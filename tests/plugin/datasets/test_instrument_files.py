@@ -1,7 +1,7 @@
 """Files as instruments and programs write them: a test for each row of ../shared/design/inputs.md of severity 2 and 3.
 
 What is written here is written by the libraries that write such files. Rows of real files look for `../shared/samples`.
-Rows of packed bits, mask pages, missing codecs, colours of 16 bits: tests/core/reading, test_tiff.py and test_formats.py.
+Rows of packed bits, mask pages, missing codecs and colours of 16 bits: tests/core/reading, test_tiff and test_formats.
 """
 
 from __future__ import annotations
