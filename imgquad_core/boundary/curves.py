@@ -31,7 +31,7 @@ def pixel_chains(graph: BoundaryGraph) -> PixelChains:
 
 def sides_of(points: Floats) -> Ints:
     """Tell what points of a pixel boundary are."""
-    is_half = points % 1.0 != 0.0
+    is_half = points != np.floor(points)
     return np.where(is_half[:, 0], ACROSS, np.where(is_half[:, 1], UP, PIXEL_CORNER))
 
 
@@ -94,6 +94,11 @@ def _along_border(graph: BoundaryGraph, first: Ints, second: Ints, last: Ints) -
     p, q = graph.points[first], graph.points[last]
     is_along = ((p == q) & ((p == 0.0) | (p == np.array(graph.shape[::-1])))).any(axis=1)
     return np.asarray(is_along & (second == last) & (graph.chain_regions == VOID).any(axis=1))
+
+
+def on_frame(graph: BoundaryGraph) -> Flags:
+    """Tell which chains of a pixel boundary lie on the picture's border."""
+    return np.asarray(graph.point_kind[graph.chain_points[graph.chain_offsets[:-1] + 1]] == PointKind.FRAME)
 
 
 def numbered(offsets: Ints, node: Ints, n_nodes: int) -> Ints:

@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from imgquad_core.arrays import Floats, Ints
 from imgquad_core.model import VOID, BoundaryGraph
 
-from .curves import curves_of, rings
+from .curves import curves_of, on_frame, rings
 
 
 class Pores(NamedTuple):
@@ -47,7 +47,7 @@ def pores_of(graph: BoundaryGraph) -> Pores:
     """
     sides = np.array(graph.chain_regions)
     walks = np.flatnonzero(sides.ravel() == VOID)  # 2 * chain + 0 along it with void on its left, + 1 against it
-    if not len(walks):
+    if on_frame(graph)[walks // 2].all():  # no pixel is void
         return Pores(sides, np.empty(0))
     n_loops, loop = _loops(graph, walks)
     area = np.bincount(loop, _swept(graph)[walks // 2] * np.where(walks % 2, -1.0, 1.0), n_loops)

@@ -27,7 +27,7 @@ from imgquad_core.geometry.conflicts import CROSSING, UNITS, find_conflicts
 from imgquad_core.jit import kernel
 from imgquad_core.model import BoundaryGraph, PointKind
 
-from .curves import ACROSS, PIXEL_CORNER, PixelChains, numbered, pixel_chains
+from .curves import ACROSS, PIXEL_CORNER, PixelChains, numbered, on_frame, pixel_chains
 
 _FEWEST_SIDES = 30  # across an axis, for a spectrum
 _LONGEST = 24.0  # px, of the periods that are looked for; the shortest is 2: places are whole numbers
@@ -91,7 +91,7 @@ def find_step(graph: BoundaryGraph) -> Step:
     """
     chains = pixel_chains(graph)
     runs = _runs_of(chains)
-    is_inner = ~_on_frame(graph)[runs.chain]
+    is_inner = ~on_frame(graph)[runs.chain]
     spectra = [_spectrum(runs, axis, is_inner) for axis in (0, 1)]
     if hexagon := _hexagon(*spectra) or _hexagon(*spectra[::-1]):
         return hexagon, hexagon
@@ -180,15 +180,10 @@ def _graph(graph: BoundaryGraph, raw: Floats, offsets: Ints, is_closed: Flags, s
     points = np.empty((int(ids.max()) + 1, 2))
     points[ids] = raw
     kind = np.full(len(points), PointKind.FREE, np.uint8)
-    kind[ids[np.repeat(_on_frame(graph), np.diff(offsets))]] = PointKind.FRAME
+    kind[ids[np.repeat(on_frame(graph), np.diff(offsets))]] = PointKind.FRAME
     kind[: len(used)] = graph.point_kind[used]
     shape = tuple((np.array(graph.shape) / size[::-1]).tolist())
     return replace(graph, points=points, point_kind=kind, chain_offsets=offsets, chain_points=ids, shape=shape)
-
-
-def _on_frame(graph: BoundaryGraph) -> Flags:
-    """Tell which chains lie on the picture's border."""
-    return np.asarray(graph.point_kind[graph.chain_points[graph.chain_offsets[:-1] + 1]] == PointKind.FRAME)
 
 
 def _runs_of(chains: PixelChains) -> _Runs:
@@ -307,8 +302,9 @@ def _stairs(runs: _Runs, is_inner: Flags) -> tuple[Flags, Flags]:
     turn = np.zeros(len(along))  # at the end of each run; 0 at the end of its chain
     same = runs.chain[1:] == runs.chain[:-1]
     turn[:-1][same] = np.sign(along[:-1, 0] * along[1:, 1] - along[:-1, 1] * along[1:, 0])[same]
-    _, which, times = np.unique(runs.end[turn != 0.0], axis=0, return_inverse=True, return_counts=True)
-    turn[np.flatnonzero(turn)[times[which.ravel()] > 1]] = 0.0  # two chains bend there: pixels that touch at a corner
+    bends = runs.end[turn != 0.0]
+    _, which, times = np.unique(bends @ [1.0, 1.0j], return_inverse=True, return_counts=True)
+    turn[np.flatnonzero(turn)[times[which] > 1]] = 0.0  # two chains bend there: pixels that touch at a corner
     between = np.zeros(len(along), bool)
     between[1:-1] = (turn[:-2] * turn[1:-1] < 0.0)[: max(len(along) - 2, 0)]
     between &= is_inner
