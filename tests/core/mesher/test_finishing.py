@@ -59,13 +59,20 @@ def test_coarse_quads_are_split_in_four_that_end_on_the_boundary(n: int) -> None
     assert worst(after) > 0.5
 
 
-def test_faces_worked_on_in_strips_are_as_good_and_hang_on_no_thread() -> None:
+def test_faces_worked_on_in_strips_hang_on_no_thread() -> None:
     graph = voronoi_graph(64, 3, 2.0, 1)
-    whole, one, two = finish(graph, 2.0), *(finish(graph, 2.0, portions=LARGE_FACES, threads=n) for n in (1, 2))
+    one, two = (finish(graph, 2.0, portions=LARGE_FACES, threads=n) for n in (1, 2))
     assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
     assert_valid_faces(one, graph)
-    assert worst(one) > worst(whole) - 0.15
-    assert irregularity(one) <= irregularity(whole) + 6
+
+
+def test_faces_worked_on_in_strips_are_nearly_as_good() -> None:
+    """Seams between strips of 8 quads cost some irregular nodes: 1.41 times as many by Triangle, 1.23 by CDT."""
+    graphs = [voronoi_graph(64, 3, 2.0, seed) for seed in range(6)]
+    whole = [finish(graph, 2.0) for graph in graphs]
+    parts = [finish(graph, 2.0, portions=LARGE_FACES) for graph in graphs]
+    assert all(worst(part) > worst(as_one) - 0.05 for part, as_one in zip(parts, whole, strict=True))
+    assert sum(map(irregularity, parts)) <= 1.5 * sum(map(irregularity, whole))
 
 
 def test_square_quads_stay_where_they_are() -> None:
