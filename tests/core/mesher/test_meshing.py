@@ -104,7 +104,7 @@ def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None
 def test_edges_are_halved_beside_points_that_fold_quads(rounds: int) -> None:
     image = label_image(np.random.default_rng(5).integers(0, 3, (40, 40)))
     graph = boundaries(image, 5.0)
-    usual, options = Tuning(), MeshingOptions(size=5.0, effort="fast")
+    usual, options = Tuning(worst=0.5), MeshingOptions(size=5.0, effort="fast")
     as_it_was = mesh_boundaries(graph, replace(options, tuning=usual._replace(worst=0.0)))
     worst = usual.worst + 0.1  # so that something is worse
     pickier = usual._replace(worst=worst, rounds=rounds, wishes=min(usual.wishes, rounds))
@@ -153,7 +153,7 @@ def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypa
 def test_a_wish_that_fails_leaves_the_valid_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     image = label_image(voronoi(60, 50, 9, 1))
     graph = boundaries(image, 4.0)
-    options = MeshingOptions(size=4.0, effort="fast")
+    options = MeshingOptions(size=4.0, effort="fast", tuning=Tuning(worst=0.0))
     as_it_was = mesh_boundaries(graph, options)
 
     def failing(*_: object) -> None:
