@@ -189,9 +189,16 @@ def _points_missing(mesh: Triangles, wanted: Floats, longest: float) -> tuple[Fl
     large = large[np.argsort(-room[large], kind="stable")]
     level = np.floor(np.log2(length[large]))
     cell = np.floor(centroid[large] / np.exp2(level)[:, None])
-    first = np.unique(np.column_stack([level, cell]), axis=0, return_index=True)[1]
-    chosen = large[np.sort(first)]
+    chosen = large[np.sort(_firsts(level, *cell.T))]
     return centroid[chosen], length[chosen]
+
+
+def _firsts(*columns: Floats) -> Ints:
+    """Return the first of all rows that are equal; np.unique takes ten times as long for rows."""
+    order = np.lexsort(columns)  # equal rows stay in their order
+    differs = np.ones(len(order), bool)
+    differs[1:] = np.any([column[order[1:]] != column[order[:-1]] for column in columns], axis=0)
+    return order[differs]
 
 
 @kernel
