@@ -198,7 +198,7 @@ def _firsts(*columns: Floats) -> Ints:
     order = np.lexsort(columns)  # equal rows stay in their order
     differs = np.ones(len(order), bool)
     differs[1:] = np.any([column[order[1:]] != column[order[:-1]] for column in columns], axis=0)
-    return order[differs]
+    return np.asarray(order[differs])
 
 
 @kernel
