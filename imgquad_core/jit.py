@@ -1,11 +1,9 @@
-"""The one way to compile a kernel. Numba is imported here only.
+"""The one way to compile a kernel. Numba is imported here, and in `lowering`, only.
 
-A function is compiled together with a copy of all that it calls, so every level of calls compiles what lies below it
-once more. What it costs at the first start is kept low by three ways to compile:
+A kernel holds a copy of all that it calls. What it costs at the first start is kept low by two ways to compile:
 
 - ``kernel``: called from Python (and by other kernels);
-- ``verb``: a small step, called by kernels only: nothing that the interpreter needs is made;
-- ``inlined``: a large step of one kernel: part of it, not compiled on its own.
+- ``verb``: a step with a name, called by kernels only: part of them, without machine code of its own.
 
 Kernels assign numbers, never slices or rows (``a[i] = b[j]``): Numba compiles its messages on shapes for these.
 
@@ -29,6 +27,8 @@ from typing import Any, NoReturn, TypeVar
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 
+from .lowering import KernelCompiler, VerbCompiler
+
 F = TypeVar("F")
 _KERNELS: list[Any] = []
 _LOG = logging.getLogger("imgquad_core")
@@ -41,25 +41,20 @@ def kernel(function: F) -> F:
 
 
 def verb(function: F) -> F:
-    """Compile `function` like a kernel, for calls by kernels only; from Python it raises TypeError."""
-    return _compiled(function, no_cpython_wrapper=True)
+    """Compile `function` as a part of the kernels that call it; from Python it raises TypeError."""
+    return _compiled(function, is_verb=True)
 
 
-def inlined(function: F) -> F:
-    """Make `function` part of the kernels that call it."""
-    return _compiled(function, inline="always")
-
-
-def _compiled(function: F, **flags: Any) -> F:
-    flags |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-    compiled: Any = numba.njit(**flags)(function)
+def _compiled(function: F, is_verb: bool = False) -> F:
+    flags = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "no_cpython_wrapper": is_verb}
+    compiled: Any = numba.njit(pipeline_class=VerbCompiler if is_verb else KernelCompiler, **flags)(function)
     if not hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT: the function itself
         return compiled  # type: ignore[no-any-return]
-    compiled._cache = _LateCache(compiled)
     _ignore_literals(compiled)
-    if flags.get("no_cpython_wrapper"):
+    if is_verb:
         _keep_from_python(compiled)
-    if "inline" not in flags:
+    else:
+        compiled._cache = _LateCache(compiled)
         _KERNELS.append(compiled)
     return compiled  # type: ignore[no-any-return]
 
@@ -84,7 +79,7 @@ def _keep_from_python(compiled: Any) -> None:
 
 
 class _LateCache:
-    """Stands for the cache of a function until that is asked for: at most starts few are, of the 200 that there are.
+    """Stands for the cache of a function until that is asked for: at most starts few are, of the 80 that there are.
 
     Numba tries for each whether its folder can be written.
     """

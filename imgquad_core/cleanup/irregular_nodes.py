@@ -16,7 +16,7 @@ import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.quad_shape import quad_area, quad_quality
-from imgquad_core.jit import inlined, kernel, verb
+from imgquad_core.jit import kernel, verb
 
 from .cavity import (
     CORNERS,
@@ -182,7 +182,7 @@ def _is_better(net: Net, cavity: Cavity, canvas: Canvas, gain: int, tolerance: f
     return new_sum <= old_sum + tolerance * gain
 
 
-@inlined
+@verb
 def _has_room(net: Net, cavity: Cavity, cut: Ints) -> bool:
     """Whether the pattern has about as many quads as the cavity, and mesh and rings can hold it."""
     quads = cut_quads(cavity.length, cavity.tally[CORNERS], cut)
@@ -197,7 +197,7 @@ def _has_room(net: Net, cavity: Cavity, cut: Ints) -> bool:
     return True
 
 
-@inlined
+@verb
 def _choose(net: Net, cavity: Cavity, cut: Ints, last_gain: int, last_size: int) -> int:
     """Return the gain of the best pattern for the cavity's outline, 0 where none helps; `cut` tells how it is cut."""
     n = cavity.tally[CORNERS]
@@ -217,7 +217,7 @@ def _choose(net: Net, cavity: Cavity, cut: Ints, last_gain: int, last_size: int)
     return 0
 
 
-@inlined
+@verb
 def _draw_better(
     net: Net, cavity: Cavity, canvas: Canvas, cut: Ints, gain: int, tolerance: float, worst: float
 ) -> bool:
@@ -228,7 +228,7 @@ def _draw_better(
     return _is_better(net, cavity, canvas, gain, tolerance, worst)
 
 
-@inlined
+@verb
 def _search(
     net: Net,
     cavity: Cavity,

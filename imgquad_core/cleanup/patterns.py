@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints
-from imgquad_core.jit import inlined, kernel, verb
+from imgquad_core.jit import kernel, verb
 
 MAX_CORNERS = 6  # of an outline that is filled: there are patterns for two to six
 
@@ -85,7 +85,7 @@ def _cut_sides(length: Ints, n: int, i: int, j: int, a: int, b: int, l: int, one
     two[i + n - j], two[i + n - j + 1] = a, l
 
 
-@inlined
+@verb
 def choose_cut(points: Floats, loop: Ints, corner: Ints, length: Ints, n: int, edge: float, best: Ints) -> bool:
     """Find the cut whose number of edges suits its length best; `best` gets (i, j, a, b, l).
 
@@ -120,7 +120,7 @@ def choose_cut(points: Floats, loop: Ints, corner: Ints, length: Ints, n: int, e
     return score < np.inf
 
 
-@inlined
+@verb
 def piece_quads(length: Ints, n: int) -> int:
     """Number of quads in the pattern of a piece."""
     if n == 4:
@@ -131,7 +131,7 @@ def piece_quads(length: Ints, n: int) -> int:
     return total
 
 
-@inlined
+@verb
 def cut_quads(length: Ints, n: int, cut: Ints) -> int:
     """Number of quads in both pieces of a cut, or in the one pattern where the cut has no edge."""
     one, two = np.empty(MAX_CORNERS + 2, np.int64), np.empty(MAX_CORNERS + 2, np.int64)
@@ -192,7 +192,7 @@ def _draw_grid(canvas: Canvas, n: int, m: int) -> None:
             canvas.tally[QUADS] += 1
 
 
-@inlined
+@verb
 def draw_piece(canvas: Canvas, length: Ints, n: int) -> None:
     """Draw the pattern of a piece: ``canvas.poly`` holds its outline counter-clockwise from corner 0."""
     poly, grid = canvas.poly, canvas.lattice
@@ -236,7 +236,7 @@ def draw_piece(canvas: Canvas, length: Ints, n: int) -> None:
         _draw_grid(canvas, a, b)
 
 
-@inlined
+@verb
 def draw_cut(canvas: Canvas, loop: Ints, corner: Ints, length: Ints, n: int, cut: Ints) -> None:
     """Draw both pieces of a cut (i, j, a, b, l), or the one pattern where the cut has no edge (l = 0)."""
     i, j, a, b, l = cut[0], cut[1], cut[2], cut[3], cut[4]

@@ -19,7 +19,7 @@ import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.quad_shape import quad_quality
-from imgquad_core.jit import inlined, kernel, verb
+from imgquad_core.jit import kernel, verb
 
 from .cavity import (
     MEMBERS,
@@ -145,7 +145,7 @@ def _worst_drawn(canvas: Canvas, floor: float) -> float:
     return worst
 
 
-@inlined
+@verb
 def _draw_star(canvas: Canvas, loop: Ints, n: int, turn: int, floor: float) -> float:
     """Draw a star whose centre is joined to the nodes turn, turn + 2, ...; return its worst quality."""
     canvas.tally[POINTS], canvas.tally[QUADS] = 1, n // 2
@@ -242,7 +242,7 @@ def _worst_member(net: Net, cavity: Cavity) -> float:
     return worst
 
 
-@inlined
+@verb
 def _draw_collapsed(net: Net, cavity: Cavity, canvas: Canvas, q: int, k: int, floor: float) -> float:
     """Draw the cavity with corners k and k + 2 of quad q made one node; return its worst quality."""
     a, c = net.quads[q, k], net.quads[q, k + 2]
@@ -294,7 +294,7 @@ def _rings_have_room(net: Net, cavity: Cavity, canvas: Canvas) -> bool:
     return bool(canvas.tally[QUADS] <= net.tops[QUADS] and canvas.tally[POINTS] <= net.tops[POINTS])
 
 
-@inlined
+@verb
 def _find(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, below: float) -> Choice:
     """Choose what makes the surroundings of quad q best; the first that leaves nothing below `below` is enough."""
     gain, best = LEAST_GAIN, Choice(-1, -1)
@@ -312,7 +312,7 @@ def _find(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, belo
     return best
 
 
-@inlined
+@verb
 def _redraw(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, choice: Choice) -> bool:
     """Draw the choice once more; return whether the nodes of the outline can take it."""
     _grow(net, cavity, q, choice.cavity)
@@ -320,7 +320,7 @@ def _redraw(net: Net, cavity: Cavity, canvas: Canvas, tables: Tables, q: int, ch
     return _rings_have_room(net, cavity, canvas)
 
 
-@inlined
+@verb
 def _fill(net: Net, cavity: Cavity, canvas: Canvas, new_id: Ints, hopeless: Flags, fresh: Flags) -> None:
     """Put what is drawn in the place of the cavity; what lies beside it is worth a try again."""
     face = net.face[cavity.members[0]]

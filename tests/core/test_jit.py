@@ -1,4 +1,4 @@
-"""The three ways to compile, and the second process at the first start."""
+"""The two ways to compile, and the second process at the first start."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from imgquad_core import ahead
-from imgquad_core.jit import inlined, kernel, verb
+from imgquad_core.jit import kernel, verb
 
 
 @verb
@@ -20,7 +20,7 @@ def _double(x: float) -> float:
     return 2.0 * x
 
 
-@inlined
+@verb
 def _plus(x: float, y: int) -> float:
     return x + y
 
@@ -30,7 +30,7 @@ def _use_both(x: float) -> float:
     return _plus(_double(x), 1) + _plus(x, 2)
 
 
-def test_kernels_use_verbs_and_inlined_steps() -> None:
+def test_kernels_use_verbs() -> None:
     assert _use_both(1.5) == 7.5
 
 

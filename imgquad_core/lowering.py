@@ -1,0 +1,119 @@
+"""Numba's compiler, quicker for this package: what it does in vain for kernels is left out.
+
+- A verb is called by kernels only, which hold a copy of it. It gets no machine code of its own, and is not optimised
+  before it is part of a kernel.
+- References to arrays are counted only where arrays are made: elsewhere the caller holds all of them.
+- Which of its 50 kinds of sums an ``a + b`` is, is looked up once for each pair of types.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.targetconfig import ConfigStack
+from numba.core.typed_passes import NativeLowering
+from numba.core.types.functions import BaseFunction
+
+_UNCOUNTED: dict[Any, Any] = {}  # Numba's own functions, compiled without counts
+_RESOLVED: dict[Any, tuple[BaseFunction, Any]] = {}
+_resolve = BaseFunction.get_call_type
+
+
+class _Part(JITCodeLibrary):  # type: ignore[misc]
+    """Code that becomes part of kernels: optimised with them, never run by itself."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _KernelLowering(NativeLowering):  # type: ignore[misc]
+    """Machine code of a kernel."""
+
+    _name = "kernel_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Compile what `state` has."""
+        if not _makes_arrays(state):
+            state.targetctx = state.targetctx.subtarget(enable_nrt=False, cached_internal_func=_UNCOUNTED)
+        return bool(super().run_pass(state))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _VerbLowering(_KernelLowering):
+    """Code of a verb, for the kernels that call it."""
+
+    _name = "verb_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Compile what `state` has."""
+        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        entry = object()  # stands for the function that Python would call: callers look the code up by it
+        state["cr"] = state["cr"]._replace(cfunc=entry)
+        state.targetctx.insert_user_function(entry, state["cr"].fndesc, [state.library])
+        return True
+
+
+def _makes_arrays(state: Any) -> bool:
+    """Whether a call, an operator or a slice of a function gives an array (or a tuple of them), or its result is one.
+
+    Numba holds what a function was given for it; nothing else in it needs a count of references then.
+    """
+    given = [signature.return_type for signature in state.calltypes.values() if signature is not None]
+    models = state.targetctx.data_model_manager
+    return any(models[kind].contains_nrt_meminfo() for kind in {state.return_type, *given})
+
+
+class KernelCompiler(CompilerBase):  # type: ignore[misc]
+    """Numba's compiler with another last step."""
+
+    _lowering = _KernelLowering
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [(self._lowering if p is NativeLowering else p, text) for p, text in passes.passes]
+        return [passes]
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile `func`."""
+        with _resolving_once():
+            return super().compile_extra(func)
+
+
+class VerbCompiler(KernelCompiler):
+    """The same for verbs."""
+
+    _lowering = _VerbLowering
+
+
+@contextmanager
+def _resolving_once() -> Iterator[None]:
+    """Remember which overload of an operator or a function of NumPy is meant, while kernels are compiled."""
+    before, BaseFunction.get_call_type = BaseFunction.get_call_type, _resolve_once
+    try:
+        yield
+    finally:
+        BaseFunction.get_call_type = before
+
+
+def _resolve_once(function: BaseFunction, context: Any, args: Any, kws: Any) -> Any:
+    flags = ConfigStack.top_or_none()
+    key = id(function), args, flags.error_model if flags else ""
+    if kws or flags is None:
+        return _resolve(function, context, args, kws)
+    if key not in _RESOLVED:
+        _RESOLVED[key] = function, _resolve(function, context, args, kws)
+    return _RESOLVED[key][1]
