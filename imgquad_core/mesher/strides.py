@@ -122,10 +122,10 @@ def _mesh_at_stride(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanU
         return Meshed([], faces, worst)
     portions = options.tuning.portions
     groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
-    composed = in_threads(
-        groups, lambda group: batches_of(_compose(graph, group, stride, options), portions), options.n_threads
-    )
     ahead.wait()
+    composed = in_threads(
+        groups, lambda group: batches_of(composed_quads(graph, group, stride, options), portions), options.n_threads
+    )
     if options.n_threads > 1:
         compile_last_stages()  # loaded by threads, in turn and one in the other's way, machine code takes twice as long
     rim = coarse_segments(graph, chains_of(graph, faces), stride // 2)  # the Catmull-Clark split has halved edges
@@ -145,7 +145,7 @@ def _groups_of(graph: BoundaryGraph, faces: Flags, sizes: Floats) -> list[Flags]
     return [faces & (group == g) for g in np.unique(group[faces])]
 
 
-def _compose(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
+def composed_quads(graph: BoundaryGraph, faces: Flags, stride: int, options: MeshingOptions) -> FaceQuads:
     """Triangulate faces, place points in layers, compose the triangles and split all to quads."""
     sizes = options.face_sizes(graph.region_label) * stride
     flat = outline(graph, faces, stride)

@@ -1,4 +1,4 @@
-"""What the second process of a first start compiles: the optimisation of quads."""
+"""What the second process of a first start compiles: how faces get quads, and the optimisation of quads."""
 
 from __future__ import annotations
 
@@ -40,8 +40,31 @@ def compile_last_stages() -> None:
     lower_to_worst(points, mesh.quads, mesh.face, np.ones(1))
 
 
+def compile_first_quads() -> None:
+    """Compile what gives a face its quads by using it on a square."""
+    from imgquad_core.model import VOID, BoundaryGraph, PointKind
+
+    from .options import MeshingOptions
+    from .strides import composed_quads
+
+    along, zero, ids = np.arange(8.0), np.zeros(8), np.arange(33) % 32
+    x, y = np.hstack([along, zero + 8.0, 8.0 - along, zero]), np.hstack([zero, along, zero + 8.0, 8.0 - along])
+    graph = BoundaryGraph(
+        np.column_stack([x, y]),
+        np.full(32, PointKind.FRAME, np.uint8),
+        np.array([0, 33]),
+        ids,
+        np.array([[0, VOID]]),
+        np.zeros(1, np.int32),
+        np.array([64]),
+        (8, 8),
+    )
+    composed_quads(graph, np.ones(1, bool), 2, MeshingOptions(size=1.0))
+
+
 if __name__ == "__main__":
     from imgquad_core.ahead import end_with_the_first
 
     end_with_the_first()
+    compile_first_quads()
     compile_last_stages()

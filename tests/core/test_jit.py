@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from imgquad_core import ahead
+from imgquad_core.arrays import Floats
 from imgquad_core.jit import kernel, verb
 
 
@@ -53,6 +54,52 @@ def test_written_numbers_do_not_compile_a_kernel_again() -> None:
     assert len(add.signatures) == 1
 
 
+@verb
+def _row(a: Floats, i: int) -> Floats:
+    return a[i]
+
+
+@kernel
+def _total(a: Floats) -> float:
+    total = 0.0
+    for i in range(len(a)):
+        total += _row(a, i)[0]
+    return total
+
+
+@kernel
+def _made(n: int) -> Floats:
+    return np.ones(n)
+
+
+@kernel
+def _length_of_made(n: int) -> int:
+    made = _made(n)  # gone at the end, though nothing here makes an array
+    return len(made)
+
+
+@kernel
+def _given(a: Floats) -> tuple[Floats, float]:
+    return a, a[0, 0]
+
+
+def test_arrays_live_as_long_as_they_are_used() -> None:
+    from numba.core.runtime import _nrt_python, rtsys
+
+    _nrt_python.memsys_enable_stats()
+    a = np.ones((3, 2))
+    before, blocks = sys.getrefcount(a), rtsys.get_allocation_stats()
+    for _ in range(50):
+        assert _total(a) == 3.0
+        assert _length_of_made(7) == 7
+        assert _given(a)[0] is a
+        assert _made(4).sum() == 4.0
+    after = rtsys.get_allocation_stats()
+    _nrt_python.memsys_disable_stats()
+    assert sys.getrefcount(a) == before
+    assert after.mi_alloc - blocks.mi_alloc == after.mi_free - blocks.mi_free > 0
+
+
 SHARE = "import imgquad_core.pipeline; from imgquad_core.jit import share_on_disk; print(share_on_disk())"
 
 
@@ -65,17 +112,18 @@ def test_nothing_is_on_disk_at_the_first_start(tmp_path: Path) -> None:
 AHEAD = """
 from imgquad_core import ahead, mesh_image, MeshOptions
 from imgquad_core.cleanup import irregular_nodes, relaxation, sliding, worst_quads
-from imgquad_core.mesher import splitting, warm_up
+from imgquad_core.mesher import composing, crossfield, cutting, frontal, splitting, warm_up
 import numpy as np
+warm_up.compile_first_quads()
 warm_up.compile_last_stages()
-modules = (relaxation, worst_quads, sliding, splitting, irregular_nodes)
+modules = (relaxation, worst_quads, sliding, splitting, irregular_nodes, composing, crossfield, cutting, frontal)
 kernels = [k for m in modules for k in vars(m).values() if hasattr(k, "signatures")]
 before = {id(k): len(k.signatures) for k in kernels}
 labels = np.zeros((40, 60), np.int32)
 labels[10:30, 15:40] = 1
 mesh_image(labels, MeshOptions(size=2.0))
 print(sorted(k.__name__ for k in kernels if before[id(k)] and len(k.signatures) > before[id(k)]))
-names = ("_clean_pass", "_repair_pass", "newton", "slide")
+names = ("_advance", "_clean_pass", "_repair_pass", "newton", "slide")
 print(sorted(k.__name__ for k in kernels if before[id(k)] and k.__name__ in names))
 from imgquad_core.jit import share_on_disk
 print(share_on_disk() > ahead.FIRST_START)
@@ -84,7 +132,7 @@ print(share_on_disk() > ahead.FIRST_START)
 
 def test_the_second_process_compiles_what_the_first_one_calls() -> None:
     done = subprocess.run([sys.executable, "-c", AHEAD], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == ["[]", "['_clean_pass', '_repair_pass', 'newton', 'slide']", "True"]
+    assert done.stdout.splitlines() == ["[]", "['_advance', '_clean_pass', '_repair_pass', 'newton', 'slide']", "True"]
 
 
 def test_the_second_process_is_of_this_package_in_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

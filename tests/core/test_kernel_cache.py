@@ -14,12 +14,16 @@ KERNELS = """
 from imgquad_core.jit import kernel, verb
 
 @verb
+def one_more(x):
+    return x + 1.0
+
+@kernel
 def double(x):
     return 2.0 * x
 
 @kernel
 def twice_and_one(x):
-    return double(x) + 1.0
+    return one_more(double(x))
 """
 USE = "import kernels_here as k; print(k.twice_and_one(3.0), sum(k.twice_and_one.stats.cache_hits.values()))"
 LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64)); "
