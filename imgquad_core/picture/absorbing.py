@@ -167,9 +167,9 @@ def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[L
             if kept.all() or not (kept & (labels != VOID)).any():
                 break
             new, _ = flood(labels, kept)
-        if attempt == ROUNDS - 1:
-            return new, is_noisy  # what rounding leaves thin may not be seen in the picture that is not enlarged
         labels = rounded(new, (new != labels) & ~stays, stays, radius, BLUNT * radius)
+    else:  # what the last rounding left thin may not be seen in the picture that is not enlarged
+        labels, _ = flood(labels, _kept(labels, stays, radius, rule))
     return labels, is_noisy
 
 
