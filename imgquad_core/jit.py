@@ -27,7 +27,13 @@ from typing import Any, NoReturn, TypeVar
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 
-from .lowering import KernelCompiler, VerbCompiler
+#: versions of Numba whose inside `lowering` knows; with others kernels are the same, and take longer to compile
+KNOWN = ("0.68",)
+if numba.__version__.rpartition(".")[0] in KNOWN:
+    from .lowering import KernelCompiler, VerbCompiler
+else:
+    from numba.core.compiler import Compiler as KernelCompiler  # type: ignore[no-redef,unused-ignore]
+    from numba.core.compiler import Compiler as VerbCompiler  # type: ignore[no-redef,unused-ignore]
 
 F = TypeVar("F")
 _KERNELS: list[Any] = []

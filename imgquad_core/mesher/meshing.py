@@ -90,7 +90,7 @@ def _slid(mesh: QuadMesh, rounds: int, threads: int, portions: Portions) -> Quad
         slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
         move(lambda free: newton(points, rings, free, 2, GOOD))
     move(lambda free: untangle(points, rings, free, 4, FAIR))
-    floor = _worst(points, mesh.quads)
+    floor = _worst(points, rings.quads)
     move(lambda free: part(points, rings, free, STUB, floor))
     return replace(mesh, points=points)
 

@@ -174,3 +174,18 @@ def test_arrays_that_may_be_read_only_compile_no_kernel_again() -> None:
     quads = np.array([[0, 1, 2, 3]])
     quads.flags.writeable = False
     assert rings_of(quads, 4).quads.flags.writeable
+
+
+def test_with_a_numba_that_lowering_does_not_know_kernels_compile_as_they_are(tmp_path: Path) -> None:
+    code = """
+import numba
+numba.__version__ = "99.1.0"
+import sys
+import numpy as np
+from imgquad_core.geometry.quad_shape import nodes_of_poor
+points, quads = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), np.arange(4)[None, :]
+print(nodes_of_poor(points, quads, 0.5).tolist(), "imgquad_core.lowering" in sys.modules)
+"""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+    assert done.stdout == "[False, False, False, False] False\n", done.stderr
