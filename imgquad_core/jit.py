@@ -134,7 +134,7 @@ def _temporary_folder() -> str | None:
 
 @cache
 def _tell_that_none_is_kept(reason: str) -> None:
-    _LOG.warning("compiled kernels are not kept, each start takes half a minute longer: %s; %s", reason, _CURE)
+    _LOG.warning("compiled kernels are not kept, each start takes up to a minute longer: %s; %s", reason, _CURE)
 
 
 class _KernelCache(FunctionCache):  # type: ignore[misc]
@@ -201,7 +201,7 @@ class _CheckedFiles(IndexDataCacheFile):  # type: ignore[misc]
 def share_on_disk() -> float:
     """Return which share of the kernels imported so far an earlier run has left on disk, from 0 to 1.
 
-    Where it is near 0 a run takes half a minute longer, for compiling.
+    Where it is near 0 a run takes up to a minute longer, for compiling.
     """
     folders = folders_on_disk()
     if not folders:

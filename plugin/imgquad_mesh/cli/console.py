@@ -14,7 +14,7 @@ import imgquad_core as core
 def announce_compiling() -> None:
     """Say so if this is the first run, which takes longer."""
     if core.pipeline.share_compiled() < 0.5:
-        Console(stderr=True).print("first run on this machine: compiling the kernels takes about half a minute, once")
+        Console(stderr=True).print("first run on this machine: compiling the kernels takes up to a minute, once")
 
 
 def print_report(report: dict[str, Any]) -> None:

@@ -99,7 +99,7 @@ async function work() {
 
 async function perform(task) {
   running = new AbortController();
-  const slow = setTimeout(() => (at("stage").textContent = "starting; the first time on a machine takes about half a minute, once"), 4000);
+  const slow = setTimeout(() => (at("stage").textContent = "starting; the first time on a machine takes up to a minute, once"), 4000);
   busy(true);
   try {
     await bringMarks();
