@@ -303,7 +303,7 @@ def _stairs(runs: _Runs, is_inner: Flags) -> tuple[Flags, Flags]:
     same = runs.chain[1:] == runs.chain[:-1]
     turn[:-1][same] = np.sign(along[:-1, 0] * along[1:, 1] - along[:-1, 1] * along[1:, 0])[same]
     bends = runs.end[turn != 0.0]
-    _, which, times = np.unique(bends @ [1.0, 1.0j], return_inverse=True, return_counts=True)
+    _, which, times = np.unique(bends[:, 0] + 1j * bends[:, 1], return_inverse=True, return_counts=True)
     turn[np.flatnonzero(turn)[times[which] > 1]] = 0.0  # two chains bend there: pixels that touch at a corner
     between = np.zeros(len(along), bool)
     between[1:-1] = (turn[:-2] * turn[1:-1] < 0.0)[: max(len(along) - 2, 0)]

@@ -7,23 +7,38 @@ from itertools import product
 import numpy as np
 import pytest
 
-from imgquad_core.cleanup.patterns import (
-    QUADS,
-    Canvas,
-    choose_cut,
-    cut_quads,
-    draw_cut,
-    draw_line,
-    draw_piece,
-    piece_fits,
-    piece_quads,
-    smooth_drawn,
-    spoke,
-)
+from imgquad_core.cleanup import patterns
+from imgquad_core.cleanup.patterns import QUADS, Canvas, draw_line, piece_fits, smooth_drawn, spoke
+from imgquad_core.jit import kernel
 from support import naive
 from support.faces import Ids, Points
 
 ROOM = 2000
+
+
+@kernel
+def choose_cut(points: Points, loop: Ids, corner: Ids, length: Ids, n: int, edge: float, best: Ids) -> bool:
+    return patterns.choose_cut(points, loop, corner, length, n, edge, best)
+
+
+@kernel
+def piece_quads(length: Ids, n: int) -> int:
+    return patterns.piece_quads(length, n)
+
+
+@kernel
+def cut_quads(length: Ids, n: int, cut: Ids) -> int:
+    return patterns.cut_quads(length, n, cut)
+
+
+@kernel
+def draw_piece(canvas: Canvas, length: Ids, n: int) -> None:
+    patterns.draw_piece(canvas, length, n)
+
+
+@kernel
+def draw_cut(canvas: Canvas, loop: Ids, corner: Ids, length: Ids, n: int, cut: Ids) -> None:
+    patterns.draw_cut(canvas, loop, corner, length, n, cut)
 
 
 def polygon(length: Ids) -> tuple[Points, Ids]:
