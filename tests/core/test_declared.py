@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import dataclass, fields
+from inspect import getdoc
 from typing import Any
 
 import numpy as np
@@ -110,7 +111,7 @@ def test_every_option_is_declared(options: type) -> None:
     for name, declaration in declared.items():
         assert declaration.help[0].islower() or declaration.help[0].isdigit()
         assert not declaration.help.endswith(".")
-        assert f"    {name} : " in (options.__doc__ or ""), f"{name} is not in the docstring of {options.__name__}"
+        assert f"\n{name} : " in (getdoc(options) or ""), f"{name} is not in the docstring of {options.__name__}"
         declaration.check(name, declaration.default)
 
 

@@ -147,7 +147,7 @@ def drift(function: Callable[..., Any], options: type) -> list[str]:
         none = parameter.default is None  # the filter has a default of its own, or says None for an empty mapping
         if not none and parameter.default != declared.default:
             found.append(f"{name} is {parameter.default!r}, not {declared.default!r}")
-        told = re.search(rf"^ +(?:\w+, )?{name}(?:, \w+)? : .*?(?:default: (.*))?$", function.__doc__ or "", re.M)
+        told = re.search(rf"^ *(?:\w+, )?{name}(?:, \w+)? : .*?(?:default: (.*))?$", function.__doc__ or "", re.M)
         if told is None:
             found.append(f"{name} is not in the docstring")
         elif told[1] and told[1].strip('"') != str(declared.default):
