@@ -159,7 +159,10 @@ export class View {
   setQuads({ corners, jacobians, places, quads }) {
     this._drop(this.quads);
     const traits = new Float32Array(2 * quads.length);
-    for (let q = 0; q < quads.length; q++) [traits[2 * q], traits[2 * q + 1]] = [jacobians[q], places[q]];
+    for (let q = 0; q < quads.length; q++) {
+      traits[2 * q] = jacobians[q];
+      traits[2 * q + 1] = places[q];
+    }
     const tables = { table: this._table(corners), traits: this._table(traits, 2), halves: this._halves(quads.length) };
     this.quads = { ...tables, corners, quads, n: quads.length, boxes: boxesOf(corners) };
   }
@@ -174,7 +177,8 @@ export class View {
   // The two triangles of each quad.
   _halves(n) {
     const gl = this.gl, made = gl.createBuffer(), corners = new Uint32Array(6 * n);
-    for (let q = 0; q < n; q++) [0, 1, 2, 0, 2, 3].forEach((k, at) => (corners[6 * q + at] = 4 * q + k));
+    const order = [0, 1, 2, 0, 2, 3];
+    for (let k = 0; k < corners.length; k++) corners[k] = 4 * Math.floor(k / 6) + order[k % 6];
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, made);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
     return made;
