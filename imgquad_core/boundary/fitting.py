@@ -151,7 +151,9 @@ def _quartic_at(samples: Samples, i: int, w: float, a: Floats) -> tuple[float, f
 
 
 @verb
-def _choose_windows(samples: Samples, first: int, scale: Floats, widest: float, windows: Floats, w: Floats) -> None:
+def _choose_windows(
+    samples: Samples, first: int, scale: Floats, closed: bool, widest: float, windows: Floats, w: Floats
+) -> None:
     """Half width of the window at the points of a piece, which begins at `first` and has these scales, into w."""
     s, sums = samples.arc, np.empty(14)
     last = first + len(scale) - 1
@@ -173,10 +175,13 @@ def _choose_windows(samples: Samples, first: int, scale: Floats, widest: float, 
         end = min(k + _EVERY, last)
         for i in range(k + 1, end):
             w[i] = w[k] + (w[end] - w[k]) * (s[i] - s[k]) / (s[end] - s[k])
-    for i in range(first + 1, last + 1):
-        w[i] = min(w[i], w[i - 1] + _SLOPE * (s[i] - s[i - 1]))
-    for i in range(last - 1, first - 1, -1):
-        w[i] = min(w[i], w[i + 1] + _SLOPE * (s[i + 1] - s[i]))
+    for _ in range(2 if closed else 1):  # a loop twice: what is narrow at its end is so before its beginning
+        for i in range(first + 1, last + 1):
+            w[i] = min(w[i], w[i - 1] + _SLOPE * (s[i] - s[i - 1]))
+        for i in range(last - 1, first - 1, -1):
+            w[i] = min(w[i], w[i + 1] + _SLOPE * (s[i + 1] - s[i]))
+        if closed:
+            w[first] = w[last] = min(w[first], w[last])
 
 
 @verb
@@ -285,7 +290,7 @@ def fit_pieces(
         if (closed[k] and n < _SHORTEST_LOOP) or widest < 1.0:
             continue
         at = _extend(Samples(x, y, arc, weight), first, last, closed[k], widest, samples)
-        _choose_windows(samples, at, scale[first : last + 1], widest, windows, w)
+        _choose_windows(samples, at, scale[first : last + 1], closed[k], widest, windows, w)
         widest_chosen = 0.0
         for j in range(n + 1):
             width[j] = w[at + j]

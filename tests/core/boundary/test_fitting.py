@@ -76,6 +76,23 @@ def test_a_circle_of_pixels_comes_out_round() -> None:
     assert np.array_equal(found[0], found[-1])
 
 
+def test_a_loop_comes_out_alike_wherever_it_begins() -> None:
+    rng, every, n_loops = np.random.default_rng(0), 4, 0  # windows are chosen at every fourth point
+    for _ in range(40):
+        centre, radius = tuple(50 + rng.random(2)), rng.uniform(8, 42)
+        found, _ = curves_of(extract_boundaries(label_image(disc(radius, centre, 101))))
+        c = int(np.flatnonzero(found.ends[:, 0] < 0)[0])
+        loop = found.raw[found.offsets[c] : found.offsets[c + 1]]
+        if (len(loop) - 1) % every:
+            continue
+        n_loops += 1
+        one = fitted(loop, np.ones(len(loop)), closed=True)
+        for by in range(every, len(loop) - 1, 13 * every):
+            other = fitted(np.vstack([loop[by:-1], loop[: by + 1]]), np.ones(len(loop)), closed=True)
+            assert other == pytest.approx(np.vstack([one[by:-1], one[: by + 1]]), abs=1e-6)  # 0.08 where seams tell
+    assert n_loops > 20
+
+
 def test_a_loop_of_a_few_points_and_points_on_no_piece_stay() -> None:
     t = np.linspace(0, 2 * np.pi, 10)
     loop = np.stack([np.cos(t), np.sin(t)], axis=1)
