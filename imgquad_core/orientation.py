@@ -1,8 +1,9 @@
 """The same mesh however the picture lies: each stage works on it turned and mirrored as its content says.
 
 Choices of smoothing and meshing that are all but even fall by the order in which they are met, and a few hundred quads
-hang on one of them. So a stage turns what it is given to the one of eight positions that the content itself picks,
-works, and turns its result back. Coordinates of boundaries are multiples of 2^-14 px: turning them loses nothing.
+hang on one of them. So a stage turns what it is given to the one of eight positions that the labels pick, the same for
+all stages, works, and turns its result back. Coordinates of boundaries are multiples of 2^-14 px: turning them loses
+nothing.
 """
 
 from __future__ import annotations
@@ -115,11 +116,27 @@ def turn_of_picture(labels: Labels) -> Turn:
 
 
 def turn_of_graph(graph: BoundaryGraph, turns: Iterable[Turn] = TURNS) -> Turn:
-    """Return the position in which the sum of a hash of all points is the least."""
+    """Return the position that the boundaries were extracted in, which the order of the picture's corners tells.
+
+    Where these do not tell (void lies at them) it is the position in which the sum of a hash of all points is least.
+    """
+    rows, cols = graph.shape
+    used = np.zeros(len(graph.points), bool)
+    used[graph.chain_points] = True
+    x, y = graph.points.T
+    corners = graph.points[used & ((x == 0) | (x == cols)) & ((y == 0) | (y == rows))]
+    falls = {turn: _falls(turn.points(corners, graph.shape)) for turn in turns}
+    left = [turn for turn in falls if falls[turn] == min(falls.values())]
+    if len(left) == 1:
+        return left[0]
     order = np.arange(len(graph.points), dtype=np.uint64) * _MIX[2]
-    lying = [turn for turn in turns if turn.transposed == (graph.shape[0] > graph.shape[1])]
-    some = list(turns) if graph.shape[0] == graph.shape[1] else lying or list(turns)
-    return min(some, key=lambda turn: _hash(turn.points(graph.points, graph.shape), order))
+    return min(left, key=lambda turn: _hash(turn.points(graph.points, graph.shape), order))
+
+
+def _falls(corners: Floats) -> int:
+    """Return how many corners of a picture stand behind one that comes later in reading order."""
+    place = 2 * (corners[:, 1] == 0) + (corners[:, 0] > 0)
+    return int(np.count_nonzero(np.diff(place) < 0))
 
 
 def _hash(points: Floats, order: NDArray[np.uint64]) -> int:
