@@ -94,10 +94,10 @@ def test_boundary_points_keep_their_ids_and_only_those_inside_chains_slide(seed:
 
 @pytest.mark.parametrize("size", [2.0, 5.0])
 def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None:
-    graph = boundaries(label_image(np.random.default_rng(0).integers(0, 3, (40, 40))), size)
+    graph = boundaries(label_image(np.random.default_rng(1).integers(0, 3, (40, 40))), size)
     mesh = mesh_boundaries(graph, MeshingOptions(size=size, effort="fast"))
     assert mesh.points[: len(graph.points)].tobytes() == graph.points.tobytes()
-    assert naive.worst_quality(mesh.points, mesh.quads) > Tuning().worst
+    assert naive.worst_quality(mesh.points, mesh.quads) > 0.5
 
 
 @pytest.mark.parametrize("rounds", [1, Tuning().rounds])
@@ -112,6 +112,7 @@ def test_edges_are_halved_beside_points_that_fold_quads(rounds: int) -> None:
     assert_valid_mesh(mesh, image)
     before, after = (naive.worst_quality(m.points, m.quads) for m in (as_it_was, mesh))
     assert before < usual.worst < after
+    assert before + 0.02 < after
     n, edges, finer = len(graph.points), np.diff(graph.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
     assert mesh.points[:n].tobytes() == graph.points.tobytes()
     assert (finer > edges).any()
