@@ -177,7 +177,7 @@ def test_noise_is_measured_white_and_correlated() -> None:
         (0.5, 0.6),
         (0.6, 0.6),
         (0.8, 0.5),
-    ):  # as of resampling: between neighbours it is under-read by 30 to 80 %
+    ):  # as of resampling: under-read near by
         smooth = ndimage.gaussian_filter(np.random.default_rng(1).normal(0, 20.0, truth.shape), blur)
         levels = levels_of(picture_of(byte(40 + 70 * truth + smooth)), None)
         assert least * smooth.std() < noise_of(levels) < 1.3 * smooth.std()
