@@ -173,11 +173,8 @@ def test_noise_is_measured_white_and_correlated() -> None:
     white = np.random.default_rng(1).normal(0, 9.0, truth.shape)
     for shades in (110 + white, 40 + 70 * truth + white):
         assert noise_of(levels_of(picture_of(byte(shades)), None)) == pytest.approx(9.0, rel=0.1)
-    for blur, least in (
-        (0.5, 0.6),
-        (0.6, 0.6),
-        (0.8, 0.5),
-    ):  # as of resampling: under-read near by
+    # as of resampling: between neighbours it is under-read by 30 to 80 %
+    for blur, least in ((0.5, 0.6), (0.6, 0.6), (0.8, 0.5)):
         smooth = ndimage.gaussian_filter(np.random.default_rng(1).normal(0, 20.0, truth.shape), blur)
         levels = levels_of(picture_of(byte(40 + 70 * truth + smooth)), None)
         assert least * smooth.std() < noise_of(levels) < 1.3 * smooth.std()
