@@ -11,7 +11,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.geometry.corner_rule import corner_rule
 from imgquad_core.options import MeshOptions
 from imgquad_core.picture import AbsorbOptions, absorb_thin, areas_of_origin
-from imgquad_core.picture.absorbing import distances, flood, near_core
+from imgquad_core.picture.cores import distances, flood, near_core
 from imgquad_core.pipeline import run
 from imgquad_core.remedies import lost_materials
 from support.invariants import assert_accounted, assert_simplified_mesh
