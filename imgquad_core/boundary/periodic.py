@@ -11,7 +11,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -107,19 +106,21 @@ def rematch(graph: BoundaryGraph, mesh: QuadMesh, directions: str) -> BoundaryGr
     )
     matches = True
     for direction in directions:
-        sides = _sides(found, "xy".index(direction))
-        shared = np.unique(np.concatenate([_heights(found, side) for side in sides]))
+        across = "xy".index(direction)
+        stations, sides = _heights(graph, _sides(graph, across)), _sides(found, across)
+        shared = _heights(found, sides)
         if any(_lacks(found, side, shared) for side in sides):
             matches = False
-            found = _bare(found, sides)
-            cuts = [np.array(pair) for pair in pairwise(shared.tolist())]
-            found = _recut(found, _sides(found, "xy".index(direction)), cuts)
+            counts = np.max([_edges_between(found, side, stations) for side in sides], axis=0)
+            bare = _bare(found, sides)
+            found = _recut(bare, _sides(bare, across), _even_cuts(stations, counts))
     return None if matches else found
 
 
-def _heights(graph: BoundaryGraph, side: _Side) -> Floats:
-    ids = [graph.chain(c) for c in side.chains.tolist()]
-    return np.unique(graph.points[np.concatenate(ids), 1 - side.across]) if ids else np.empty(0)
+def _heights(graph: BoundaryGraph, sides: tuple[_Side, _Side]) -> Floats:
+    """Return the places of the nodes of two sides, ascending, each once."""
+    ids = [graph.chain(c) for side in sides for c in side.chains.tolist()]
+    return np.unique(graph.points[np.concatenate(ids), 1 - sides[0].across]) if ids else np.empty(0)
 
 
 def _lacks(graph: BoundaryGraph, side: _Side, heights: Floats) -> bool:
@@ -129,6 +130,27 @@ def _lacks(graph: BoundaryGraph, side: _Side, heights: Floats) -> bool:
         if ((heights >= own.min()) & (heights <= own.max())).sum() > len(own):
             return True
     return False
+
+
+def _edges_between(graph: BoundaryGraph, side: _Side, stations: Floats) -> Ints:
+    """Return how many edges the side has between each two of `stations` that follow each other."""
+    ends = np.concatenate(_edge_lengths(graph, side)).reshape(2, -1)
+    return np.bincount(np.searchsorted(stations, ends.mean(axis=0)) - 1, minlength=len(stations) - 1)
+
+
+def _even_cuts(stations: Floats, counts: Ints) -> list[Floats]:
+    """Return the places of the nodes from each station to the next, both included.
+
+    Not where the mesher has left them: they slide, on each side as its own quads want it.
+    """
+    pairs = zip(stations[:-1].tolist(), stations[1:].tolist(), np.maximum(counts, 1).tolist(), strict=True)
+    return [_between(a, b, count) for a, b, count in pairs]
+
+
+def _between(a: float, b: float, count: int) -> Floats:
+    places = snapped(np.linspace(a, b, count + 1))
+    places[[0, -1]] = a, b
+    return places
 
 
 def _areas(graph: BoundaryGraph) -> Floats:

@@ -15,13 +15,14 @@ import numpy as np
 
 from imgquad_core import ahead
 from imgquad_core.arrays import Flags, Floats, Ints, Labels
-from imgquad_core.chains import without_unused_points
+from imgquad_core.chains import edges_of_chains, without_unused_points
 from imgquad_core.cleanup.batches import in_threads
 from imgquad_core.cleanup.faces import FaceQuads, joined, stitched
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.cleanup.relaxation import GOOD, GUARD, newton, part, rings_of, untangle
 from imgquad_core.cleanup.sliding import slide
 from imgquad_core.cleanup.strips import independent_nodes, strips_of
+from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.model import BoundaryGraph, Materials, PointKind, QuadMesh
 
@@ -60,9 +61,11 @@ def mesh_boundaries(
     Raises
     ------
     TopologyError
-        If the chains cross.
+        If the chains cross, or one has an odd number of edges.
     """
     options = options or MeshingOptions()
+    if (odd := np.flatnonzero(edges_of_chains(graph) % 2)).size:
+        raise TopologyError(f"chain {odd[0]} has {edges_of_chains(graph)[odd[0]]} edges: give each an even number")
     graph = consistent(graph, np.ones(graph.n_chains, bool), options.triangulator)
     graph = with_short_chains_halved(graph, LEAST_WIDTH)
     state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options))

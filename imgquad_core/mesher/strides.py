@@ -155,6 +155,8 @@ def composed_quads(graph: BoundaryGraph, faces: Flags, stride: int, options: Mes
     points = np.vstack([flat.points, frontal_points(cut, field)])
     cut = _cut(triangulate(points, flat.segments, triangulator=options.triangulator), flat)
     quads = split_composed(cut, compose(cut), len(flat.ids))
+    if (lost := np.setdiff1d(np.flatnonzero(faces), quads.face)).size:
+        raise _Conflict(lost)
     n = len(cut.points)
     origin = quads.origin.copy()
     origin[:n] = np.where(origin[:n] >= 0, flat.ids[np.maximum(origin[:n], 0)], -1)

@@ -86,6 +86,17 @@ def test_sides_match_even_where_the_mesher_cuts_edges_of_one_side(seed: int) -> 
         assert all(len(pairs) > 2 for pairs in tied.periodic.values())
 
 
+def test_edges_that_the_mesher_cut_are_cut_alike_on_both_sides_not_where_it_left_them() -> None:
+    options = MeshOptions(size=4.0, periodic="x")
+    made = run(wrapped_disks(1, 160, 25), options)  # the mesher cuts its sides five times
+    graph = made.boundary
+    outer = (graph.chain_regions == VOID).any(axis=1)
+    assert (np.diff(graph.chain_offsets) % 2 == 1).all()  # an even number of edges
+    at = [graph.points[graph.chain(c)] for c in np.flatnonzero(outer)]
+    heights = [np.unique(np.concatenate([p[:, 1] for p in at if (p[:, 0] == x).all()])) for x in (0.0, 160.0)]
+    assert np.array_equal(*heights)
+
+
 def test_sides_of_which_a_material_was_dropped_match_where_both_are_meshed() -> None:
     labels = np.zeros((40, 40), np.int32)
     labels[5:20, :10] = 1

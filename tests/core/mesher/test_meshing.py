@@ -11,6 +11,7 @@ import pytest
 
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
+from imgquad_core.cleanup.faces import faces_only
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.measures.quality import quality_report
@@ -357,6 +358,26 @@ def test_bands_are_meshed() -> None:
     mesh = mesh_boundaries(bands(np.full(9, 5.0), np.full(9, 3.0)), MeshingOptions(1.0))
     assert naive.worst_quality(mesh.points, mesh.quads) > 0.5
     assert set(mesh.quad_region.tolist()) == {0, 1, 2}
+
+
+def test_chains_of_an_odd_number_of_edges_are_an_error() -> None:
+    square = np.array([[0, 0], [2, 0], [4, 0], [4, 4], [0, 4.0]])
+    graph = graph_of(square, [[0, 1, 2, 3, 4, 0]], [(0, -1)], (4, 4))
+    with pytest.raises(TopologyError, match="chain 0 has 5 edges: give each an even number"):
+        mesh_boundaries(graph)
+
+
+def test_a_face_without_quads_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = boundaries(label_image(voronoi(40, 40, 3, 4)), 4.0)
+    composed = strides.split_composed
+
+    def forgetful(*args: Any) -> Any:
+        quads = composed(*args)
+        return faces_only(quads, np.arange(len(graph.region_label)) != 1)
+
+    monkeypatch.setattr(strides, "split_composed", forgetful)
+    with pytest.raises(TopologyError, match=r"the outlines of regions \[1\]"):
+        mesh_boundaries(graph, MeshingOptions(size=4.0))
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
