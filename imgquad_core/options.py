@@ -315,6 +315,7 @@ class MeshOptions:
             tolerance=self.tolerance,
             join=self.join,
             edge_multiple=EFFORTS[self.effort].edge_multiple,
+            threads=self.threads,
         )
 
     def meshing(self, materials: Materials | None) -> MeshingOptions:

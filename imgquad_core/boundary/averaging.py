@@ -49,7 +49,7 @@ _THIN = 3.0  # the same where a narrower bell is needed: chains that meet at mor
 _ROUNDS = 12  # of halving widths; afterwards whole chains keep their pixels
 
 
-def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelChains:
+def averaged(chains: PixelChains, width: float, units: Floats | float, threads: int = 1) -> PixelChains:
     """Average chains over a width.
 
     Parameters
@@ -60,6 +60,8 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
         More than 1.
     units : float or float64, shape (2,)
         Steps of the grid on which coordinates are exact, a unit of length, of x and y, before.
+    threads : int
+        How many share the points.
 
     Returns
     -------
@@ -67,8 +69,8 @@ def averaged(chains: PixelChains, width: float, units: Floats | float) -> PixelC
         The same chains, coordinates and picture divided by `width`.
     """
     curves, ends = curves_of(*chains)
-    room = _ROOM * local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO)
-    thin = local_feature_size(curves.raw, curves, _REACH * width, _THIN)
+    room = _ROOM * local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO, threads=threads)
+    thin = local_feature_size(curves.raw, curves, _REACH * width, _THIN, threads=threads)
     scale = _graded(curves, np.minimum(_widest(chains.graph, curves, width), _OF_FREE * thin))
     new = np.ones(len(curves.ends), bool)
     for attempt in range(_ROUNDS + 2):

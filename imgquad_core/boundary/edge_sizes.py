@@ -33,6 +33,7 @@ def edge_sizes(
     growth: float,
     edge_ratio: float,
     shape: tuple[float, float],
+    threads: int = 1,
 ) -> Floats:
     """Wanted length of final edges at each dense point.
 
@@ -50,6 +51,8 @@ def edge_sizes(
         Largest ratio of neighbouring elements, and of neighbouring edges of a chain.
     shape : tuple of float
         (n_rows, n_cols) of the picture.
+    threads : int
+        How many share the points.
 
     Returns
     -------
@@ -57,7 +60,7 @@ def edge_sizes(
         Length in pixels.
     """
     reach = min(float(limit.max()) / _ACROSS, float(np.hypot(*shape)))
-    lfs = local_feature_size(points, curves, reach, _BEND)
+    lfs = local_feature_size(points, curves, reach, _BEND, threads=threads)
     size = np.minimum(limit, _ACROSS * lfs)
     _limit_turn(points, curves, np.cumsum(is_corner), size)
     size = np.minimum(np.maximum(size, _FINEST * curves.scale), limit)

@@ -8,6 +8,7 @@ curve do not count, the other side of a thin vein does, and so do two chains tha
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from imgquad_core.arrays import Floats, Ints
 from imgquad_core.grouping import grouped
 from imgquad_core.jit import kernel, verb
+from imgquad_core.threads import even_parts, in_threads
 
 from .curves import Curves
 
@@ -31,7 +33,9 @@ class Buckets(NamedTuple):
     cell: float  #: side of a cell, px
 
 
-def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float, corner: Ints | None = None) -> Floats:
+def local_feature_size(
+    points: Floats, curves: Curves, reach: float, bend: float, corner: Ints | None = None, threads: int = 1
+) -> Floats:
     """Distance to the nearest foreign point of the boundary.
 
     Parameters
@@ -46,6 +50,8 @@ def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float
         Arc over distance from which a point is foreign.
     corner : int64, shape (n,), optional
         Corner that each point is beside, -1 for none: both sides of one corner are not foreign to each other.
+    threads : int
+        How many share the points.
 
     Returns
     -------
@@ -59,7 +65,8 @@ def local_feature_size(points: Floats, curves: Curves, reach: float, bend: float
     while True:
         ids = np.arange(len(points)) if stride == 1 else _every(curves.offsets, stride)
         buckets = bucket(points, ids, max(level / 2, 1.0))
-        _nearest_foreign(points, curves, chain, corner, ids, buckets, level, bend, lfs)
+        for_part = partial(_nearest_foreign, points, curves, chain, corner, buckets, level, bend, lfs)
+        in_threads([ids[part] for part in even_parts(np.ones(len(ids), np.int64), threads)], for_part, threads)
         if stride > 1:
             _spread(ids, stride, chain, lfs)
         if level >= reach:
@@ -108,11 +115,11 @@ def _nearest_foreign(
     curves: Curves,
     chain: Ints,
     corner: Ints,
-    ids: Ints,
     buckets: Buckets,
     reach: float,
     bend: float,
     lfs: Floats,
+    ids: Ints,
 ) -> None:
     start, n_across, cell = buckets.start, buckets.n_across, buckets.cell
     n_up = (len(start) - 1) // n_across

@@ -19,6 +19,7 @@ import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.jit import kernel, verb
+from imgquad_core.threads import even_parts, in_threads
 
 WINDOWS = (3.0, 4.5, 6.5, 9.5, 14.0, 20.0, 30.0, 45.0, 65.0)  #: half widths that are tried, px of arc
 STAIR_NOISE = 0.33  #: px; steps of a digital straight line have a deviation of 1 / sqrt(12) = 0.289, some more
@@ -243,9 +244,15 @@ def _extend(chain: Samples, first: int, last: int, closed: bool, reach: float, o
     return before
 
 
-@kernel
 def fit_pieces(
-    points: Floats, arc: Floats, weight: Floats, scale: Floats, pieces: Ints, closed: Flags, windows: Floats
+    points: Floats,
+    arc: Floats,
+    weight: Floats,
+    scale: Floats,
+    pieces: Ints,
+    closed: Flags,
+    windows: Floats,
+    threads: int = 1,
 ) -> Floats:
     """Smooth pieces of chains by local quadratics and, where windows are wide, quartics.
 
@@ -265,13 +272,24 @@ def fit_pieces(
         The piece is a whole closed chain (its last point is its first).
     windows : float64
         Half widths to choose from, ascending.
+    threads : int
+        How many share the pieces.
 
     Returns
     -------
     float64, shape (n, 2)
         Fitted points; points on no piece as they were.
     """
-    fitted = points.copy()
+    chains, fitted = Samples(points[:, 0].copy(), points[:, 1].copy(), arc, weight), points.copy()
+    parts = even_parts(pieces[:, 1] - pieces[:, 0], threads)
+    in_threads(parts, lambda part: _fit(chains, scale, pieces[part], closed[part], windows, fitted), threads)
+    return fitted
+
+
+@kernel
+def _fit(chains: Samples, scale: Floats, pieces: Ints, closed: Flags, windows: Floats, fitted: Floats) -> None:
+    """Fit pieces of chains; points inside them, and where closed ones begin, are all that changes."""
+    x, y, arc, weight = chains.x, chains.y, chains.arc, chains.weight
     longest = 0
     for k in range(len(pieces)):
         longest = max(longest, pieces[k, 1] - pieces[k, 0])
@@ -279,8 +297,7 @@ def fit_pieces(
     samples = Samples(np.empty(room), np.empty(room), np.empty(room), np.empty(room))
     w = np.empty(room)
     width = np.empty(longest + 1)
-    true_arc = np.empty(len(points))
-    x, y = points[:, 0].copy(), points[:, 1].copy()
+    true_arc = np.empty(len(x))
     sums, matrix = np.empty(14), np.empty((5, 7))
     for k in range(len(pieces)):
         first, last = pieces[k, 0], pieces[k, 1]
@@ -289,7 +306,7 @@ def fit_pieces(
         widest = min(length / 4 if closed[k] else length / 2, windows[-1])
         if (closed[k] and n < _SHORTEST_LOOP) or widest < 1.0:
             continue
-        at = _extend(Samples(x, y, arc, weight), first, last, closed[k], widest, samples)
+        at = _extend(chains, first, last, closed[k], widest, samples)
         _choose_windows(samples, at, scale[first : last + 1], closed[k], widest, windows, w)
         widest_chosen = 0.0
         for j in range(n + 1):
@@ -304,4 +321,3 @@ def fit_pieces(
                 true_arc[first + j + 1] = true_arc[first + j] + step
             at = _extend(Samples(x, y, true_arc, weight), first, last, closed[k], _WIDER * widest, samples)
             _put_quartics(samples, at, width, scale[first : last + 1], closed[k], piece, matrix)
-    return fitted

@@ -12,6 +12,7 @@ from imgquad_core.declared import (
     POLICY,
     SIZE,
     SIZES_BETWEEN,
+    THREADS,
     Declaration,
     check,
     option,
@@ -75,6 +76,8 @@ class SmoothingOptions:
         `max_shift` or the tolerance where not given; 0 for none.
     edge_multiple : {4, 12}
         Very long pieces between corners get a multiple of this many edges, up to 10 % longer or shorter than asked.
+    threads : int
+        Number of threads, 0: one for each core that may be used; the boundary does not depend on it.
     """
 
     size: float = SIZE.field()
@@ -149,6 +152,7 @@ class SmoothingOptions:
         choices=(4, 12),
         topic="boundaries",
     )
+    threads: int = THREADS.field()
 
     def __post_init__(self) -> None:
         check(self)

@@ -15,6 +15,7 @@ import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.jit import kernel, verb
+from imgquad_core.threads import even_parts, in_threads
 
 from .curves import Curves, line_beside, started_at
 from .fitting import Samples, quadratic_at
@@ -36,13 +37,15 @@ _ROUND = 2 * _BESIDE + 2
 _AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
 
 
-def find_corners(curves: Curves) -> tuple[Curves, Flags]:
+def find_corners(curves: Curves, threads: int = 1) -> tuple[Curves, Flags]:
     """Find sharp corners; closed chains that have some are turned round to start at one.
 
     Parameters
     ----------
     curves : Curves
         The pixel boundary.
+    threads : int
+        How many share the chains.
 
     Returns
     -------
@@ -51,7 +54,10 @@ def find_corners(curves: Curves) -> tuple[Curves, Flags]:
     is_corner : bool, shape (n,)
         Dense points that are corners; where a closed chain starts at one, its last point too.
     """
-    return started_at(curves, _find(curves, _SIDES) & (curves.scale >= _WHOLE))
+    is_corner = np.zeros(len(curves.raw), bool)
+    parts = even_parts(np.diff(curves.offsets), threads)
+    in_threads(parts, lambda part: _find(curves, _SIDES, part.start, part.stop, is_corner), threads)
+    return started_at(curves, is_corner & (curves.scale >= _WHOLE))
 
 
 def place_corners(curves: Curves, is_corner: Flags, room: Floats, points: Floats) -> None:
@@ -103,14 +109,14 @@ def _mark_side(curves: Curves, c: int, i: int, step: int, is_corner: Flags, corn
 
 
 @kernel
-def _find(curves: Curves, lengths: Floats) -> Flags:
+def _find(curves: Curves, lengths: Floats, begin: int, end: int, is_corner: Flags) -> None:
+    """Flag the corners of the chains from `begin` to before `end`."""
     score = np.zeros(len(curves.raw))
-    is_corner = np.zeros(len(curves.raw), np.bool_)
     most = _ROUND  # samples on both sides of a point: all those of its chain if need be
-    for c in range(len(curves.ends)):
+    for c in range(begin, end):
         most = max(most, curves.offsets[c + 1] - curves.offsets[c] + 2)
     beside, sums = Samples(np.empty(most), np.empty(most), np.empty(most), np.full(most, 1.0)), np.empty(14)
-    for c in range(len(curves.ends)):
+    for c in range(begin, end):
         if curves.is_frame[c]:
             continue
         first, last = curves.offsets[c], curves.offsets[c + 1] - 1
@@ -129,7 +135,6 @@ def _find(curves: Curves, lengths: Floats) -> Flags:
                 _, n = _gather(curves, c, i, beside)
                 is_told = side >= _LONG or (side >= _FAIR and abs(turn - 0.5 * np.pi) <= _OFF_RIGHT)
                 is_corner[i] = straight > 0.0 and (is_told or _off_circle(beside, n) >= _UNROUND)
-    return is_corner
 
 
 @verb

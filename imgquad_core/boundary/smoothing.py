@@ -16,6 +16,7 @@ import numpy as np
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.conflicts import UNITS, snapped
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
+from imgquad_core.threads import threads_of
 
 from .averaging import averaged
 from .curves import Curves, PixelChains, curves_of, per_point, pin_ends, pixel_chains
@@ -78,18 +79,18 @@ def smooth_chains(
 ) -> Smoothed:
     """Do what `smooth_boundaries` does; `barred` chains are not joined, however short."""
     step = find_step(graph) if options.step == "auto" else as_step(options.step)
-    true = _TrueShape.of(graph.shape, shape, step)
+    true, threads = _TrueShape.of(graph.shape, shape, step), threads_of(options.threads)
     pores = pores_of(graph)
     chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step, barred)
     width = 0.5 * options.tolerance / true.unit
     if width > 1.0:
-        chains = averaged(chains, width, UNITS * np.array(step))
+        chains = averaged(chains, width, UNITS * np.array(step), threads)
         true = _TrueShape.of(graph.shape, shape, (step[0] * width, step[1] * width))
     curves, ends = curves_of(*chains)
-    curves, is_corner = find_corners(curves)
-    room = _room(curves, is_corner, options.max_shift)
+    curves, is_corner = find_corners(curves, threads)
+    room = _room(curves, is_corner, options.max_shift, threads)
     node = place_junctions(curves, ends, room, chains.graph.shape)
-    smooth = _smooth(curves, node, is_corner, room)
+    smooth = _smooth(curves, node, is_corner, room, threads)
     if true.extent != chains.graph.shape:
         curves, ends, node, smooth = stretch(curves, ends, node, smooth, chains.graph.shape, true.extent)
     limit = per_point(curves, _asked_sizes(chains.graph, curves.is_frame, options) / true.unit)
@@ -105,7 +106,7 @@ def smooth_chains(
         true.extent,
         true.grid,
     )
-    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent)
+    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent, threads)
     nodes, gently = place_freely(draft, size)
     areas = np.append(graph.region_pixels, pores.pixels) * true.pixel
     sides = pores.sides[which]
@@ -162,21 +163,21 @@ def _asked_sizes(graph: BoundaryGraph, is_frame: Flags, options: SmoothingOption
     return np.asarray(asked)
 
 
-def _room(curves: Curves, is_corner: Flags, max_shift: float) -> Floats:
+def _room(curves: Curves, is_corner: Flags, max_shift: float, threads: int) -> Floats:
     """How far smoothing may move each dense point."""
     reach = max(_NARROW, max_shift / _ROOM)
     corner = beside_corners(curves, is_corner)
-    free = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO, corner)
+    free = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO, corner, threads)
     return np.asarray(np.minimum(free, np.where(is_corner, 1.0, _SHARE) * max_shift * curves.scale))
 
 
-def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats) -> Floats:
+def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats, threads: int) -> Floats:
     """Smooth all chains between their moved ends and corners, within `room` of the pixel boundary."""
     pinned = curves.raw.copy()
     place_corners(curves, is_corner, room, pinned)
     pin_ends(pinned, curves, node)
     pieces, closed = _pieces(curves, is_corner)
-    fitted = fit_pieces(pinned, curves.arc, curves.weight, curves.scale, pieces, closed, np.array(WINDOWS))
+    fitted = fit_pieces(pinned, curves.arc, curves.weight, curves.scale, pieces, closed, np.array(WINDOWS), threads)
     shift = fitted - curves.raw
     length = np.hypot(shift[:, 0], shift[:, 1])
     smooth: Floats = curves.raw + shift * np.minimum(1.0, room / np.maximum(length, 1e-300))[:, None]

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 import numpy as np
 
 from imgquad_core.arrays import Ints
+from imgquad_core.threads import in_threads
 
 from .faces import FaceQuads, taken_out
 from .options import PORTIONS, Portions
 
-Part = TypeVar("Part")
 Result = TypeVar("Result")
 TILE = 8  # edge lengths; quads of a batch are numbered tile by tile
 
@@ -23,14 +22,6 @@ def in_batches(
 ) -> list[Result]:
     """Call `work` for groups of whole faces; the results come in the order of the batches, whatever the threads."""
     return in_threads(batches_of(mesh, portions), work, threads)
-
-
-def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) -> list[Result]:
-    """Call `work` for each part; the results come in the order of the parts, whatever the threads."""
-    if threads == 1 or len(parts) == 1:
-        return [work(part) for part in parts]
-    with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(work, parts))
 
 
 def batches_of(mesh: FaceQuads, portions: Portions = PORTIONS) -> list[FaceQuads]:

@@ -13,11 +13,12 @@ from imgquad_core.geometry.quad_shape import lower_to_worst, nodes_of_poor
 from imgquad_core.grouping import grouped
 from imgquad_core.measures.quality import corner_angles, scaled_jacobian, sectors_of
 from imgquad_core.model import QuadMesh
+from imgquad_core.threads import threads_of
 
 from .batches import in_batches
 from .faces import INNER_VALENCE, FaceQuads, faces_only, joined, stitched, wanted_quads
 from .irregular_nodes import clean_up
-from .options import CleanUp, OptimizationOptions, threads_of
+from .options import CleanUp, OptimizationOptions
 from .relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
 from .strips import nodes_around
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,24 +26,6 @@ class Portions(NamedTuple):
 
 
 PORTIONS = Portions()
-
-
-def threads_of(asked: int) -> int:
-    """Return the number of threads that was asked for; 0 asks for all cores that the process may use.
-
-    OMP_NUM_THREADS limits that, as it does for others: batch systems and Dask set it, whose workers share a machine.
-    """
-    if asked:
-        return asked
-    limit = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
-    cores = _cores()
-    return min(cores, int(limit)) if limit.isdecimal() and int(limit) else cores
-
-
-def _cores() -> int:
-    if hasattr(os, "process_cpu_count"):  # Python 3.13
-        return os.process_cpu_count() or 1
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.jit import kernel
+from imgquad_core.threads import in_threads
 
-from .batches import in_threads
 from .faces import FaceQuads, taken_out
 from .options import PORTIONS, Portions
 

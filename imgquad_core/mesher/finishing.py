@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats
-from imgquad_core.cleanup.batches import in_threads, is_large
+from imgquad_core.cleanup.batches import is_large
 from imgquad_core.cleanup.faces import INNER_VALENCE, FaceQuads, wanted_quads
 from imgquad_core.cleanup.irregular_nodes import clean_up
 from imgquad_core.cleanup.options import CleanUp, Portions
@@ -19,6 +19,7 @@ from imgquad_core.cleanup.strips import LEFT_ALONE, in_pieces, independent_nodes
 from imgquad_core.cleanup.worst_quads import repair
 from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.geometry.quad_shape import nodes_of_poor, sector_angles
+from imgquad_core.threads import in_threads
 
 from .splitting import points_between, split_quads
 from .triangulation import Constraints

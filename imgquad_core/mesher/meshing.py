@@ -16,7 +16,6 @@ import numpy as np
 from imgquad_core import ahead
 from imgquad_core.arrays import Flags, Floats, Ints, Labels
 from imgquad_core.chains import edges_of_chains, without_unused_points
-from imgquad_core.cleanup.batches import in_threads
 from imgquad_core.cleanup.faces import FaceQuads, joined, stitched
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.cleanup.relaxation import GOOD, GUARD, newton, part, rings_of, untangle
@@ -25,6 +24,7 @@ from imgquad_core.cleanup.strips import independent_nodes, strips_of
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.model import BoundaryGraph, Materials, PointKind, QuadMesh
+from imgquad_core.threads import in_threads
 
 from .efforts import EFFORTS
 from .options import MeshingOptions

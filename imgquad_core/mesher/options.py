@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from imgquad_core.cleanup.options import threads_of
 from imgquad_core.declared import EFFORT, GROWTH, MATERIAL_SIZES, SIZE, THREADS, check, option
+from imgquad_core.threads import threads_of
 
 from .efforts import TUNING, Tuning
 from .triangulators import TRIANGULATORS, triangulator_used

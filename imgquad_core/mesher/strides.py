@@ -12,12 +12,13 @@ import numpy as np
 from imgquad_core import ahead
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.chains import halved
-from imgquad_core.cleanup.batches import batches_of, in_threads
+from imgquad_core.cleanup.batches import batches_of
 from imgquad_core.cleanup.faces import FaceQuads, faces_only
 from imgquad_core.cleanup.options import CleanUp
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.model import BoundaryGraph
+from imgquad_core.threads import in_threads
 
 from .composing import compose
 from .crossfield import cross_field

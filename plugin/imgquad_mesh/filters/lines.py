@@ -30,6 +30,7 @@ def smooth(
     tolerance: float = 0.0,
     join: float | None = None,
     edge_multiple: Literal[4, 12] = 4,
+    threads: int = 0,
     periodic: Periodic = "none",
     unit: Unit = "pixels",
     progress_bar: bool = False,
@@ -69,6 +70,8 @@ def smooth(
     edge_multiple : 4 | 12, default: 4
         Very long boundaries get a multiple of this many edges, up to 10 % off the size: with 12 and effort "best" the
         quads of very wide regions are then split in nine.
+    threads : int, default: 0
+        Number of threads, 0: one for each core that may be used; the boundaries do not depend on it.
     periodic : "none" | "x" | "y" | "xy", default: "none"
         Opposite sides get nodes at the same places, for a periodic cell.
     unit : "pixels" | "world", default: "pixels"
@@ -84,6 +87,7 @@ def smooth(
     values = checked(growth=growth, edge_ratio=edge_ratio, max_shift=max_shift, edge_multiple=edge_multiple, step=step)
     sizes = checked(size=size, boundary_size=boundary_size, frame_size=frame_size, material_sizes=material_sizes)
     sizes |= checked(sizes_between=sizes_between, tolerance=tolerance, join=join)
+    values |= checked(threads=threads)
     repeat = checked(periodic=periodic)["periodic"]
     given = datasets.from_lines(lines)
     if given.sizes is not None:

@@ -1,0 +1,50 @@
+"""Work shared by threads: kernels release the interpreter, and what they give does not hang on how many there are."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from .arrays import Ints
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
+LEAST = 20_000  # points of a part; below it a thread costs more than it does
+
+
+def threads_of(asked: int) -> int:
+    """Return the number of threads that was asked for; 0 asks for all cores that the process may use.
+
+    OMP_NUM_THREADS limits that, as it does for others: batch systems and Dask set it, whose workers share a machine.
+    """
+    if asked:
+        return asked
+    limit = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
+    cores = _cores()
+    return min(cores, int(limit)) if limit.isdecimal() and int(limit) else cores
+
+
+def _cores() -> int:
+    if hasattr(os, "process_cpu_count"):  # Python 3.13
+        return os.process_cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) -> list[Result]:
+    """Call `work` for each part; the results come in the order of the parts, whatever the threads."""
+    if threads == 1 or len(parts) == 1:
+        return [work(part) for part in parts]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, parts))
+
+
+def even_parts(points: Ints, threads: int, least: int = LEAST) -> list[slice]:
+    """Cut a sequence whose items have these numbers of points into parts of about as many, one a thread at most."""
+    total = points.cumsum()
+    count = min(max(int(total[-1]) // least, 1), threads) if len(total) else 1
+    cuts = total.searchsorted([total[-1] * k / count for k in range(1, count)]).tolist() if count > 1 else []
+    return [slice(a, b) for a, b in pairwise([0, *cuts, len(points)])]
