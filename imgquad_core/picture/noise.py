@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Ints, Labels
+from imgquad_core.arrays import Flags, Ints, Labels
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, corner_rule, joined_pair
 from imgquad_core.grouping import root_of
@@ -131,16 +131,15 @@ def list_removed(
     if before.labels is after.labels:
         return ()
     changed = (before.labels != after.labels).ravel()
-    root = labelled_clusters(_ranked(before)[1], corner_rule(policy, step)).parent
-    while (root != root[root]).any():
-        root = root[root]
-    lost = before.labels.ravel()[changed]
-    # its first pixel stands for a cluster, even if that is kept: what is recoloured first may part others at a corner
-    firsts = before.labels.ravel()[np.unique(root[changed])]
-    materials, pixels = np.unique(lost, return_counts=True)
+    materials, pixels = np.unique(before.labels.ravel()[changed], return_counts=True)
+    values, colors = _ranked(before)
+    # all of a cluster counts, even if some is kept: what is recoloured first may part others at a corner
+    clusters = dict(
+        zip(values.tolist(), _touched(colors, changed, len(values), corner_rule(policy, step)), strict=True)
+    )
     return tuple(
-        Removal(int(m), before.materials.name_of(int(m)), int(np.count_nonzero(firsts == m)), int(n))
-        for m, n in zip(materials, pixels, strict=True)
+        Removal(int(m), before.materials.name_of(int(m)), int(clusters[m]), int(n))
+        for m, n in zip(materials.tolist(), pixels, strict=True)
     )
 
 
@@ -243,6 +242,46 @@ def merged_roots(clusters: Clusters, queue: Queue, size: int, roots: Labels) -> 
         n += 1
         p = queue.earlier[p]
     return n
+
+
+@kernel
+def _touched(colors: Labels, changed: Flags, n_colors: int, rule: int) -> Ints:
+    """Count by colour the clusters that have changed pixels, each walked through once."""
+    cols = colors.shape[1]
+    count, seen = np.zeros(n_colors, np.int64), np.zeros(colors.size, np.bool_)
+    front = np.empty(colors.size, np.int32)
+    for start in range(colors.size):
+        if not changed[start] or seen[start]:
+            continue
+        count[colors[start // cols, start % cols]] += 1
+        front[0], seen[start] = start, True
+        n, k = 1, 0
+        while k < n:
+            p = front[k]
+            k += 1
+            for q in sides(p, colors.shape[0], cols):
+                if q >= 0 and not seen[q] and colors[q // cols, q % cols] == colors[p // cols, p % cols]:
+                    front[n], seen[q] = q, True
+                    n += 1
+            for q in over_corners(colors, p, rule):
+                if q >= 0 and not seen[q]:
+                    front[n], seen[q] = q, True
+                    n += 1
+    return count
+
+
+@verb
+def over_corners(colors: Labels, p: int, rule: int) -> tuple[int, int, int, int]:
+    """Return the pixels that pixel `p` is joined with over its corners, -1 where it is not."""
+    rows, cols = colors.shape
+    r, c = p // cols, p % cols
+    up, down, left, right = r > 0, r < rows - 1, c > 0, c < cols - 1
+    return (
+        p - cols - 1 if up and left and joined_pair(colors, r, c, rule) == PAIR_AD else -1,
+        p - cols + 1 if up and right and joined_pair(colors, r, c + 1, rule) == PAIR_BC else -1,
+        p + cols - 1 if down and left and joined_pair(colors, r + 1, c, rule) == PAIR_BC else -1,
+        p + cols + 1 if down and right and joined_pair(colors, r + 1, c + 1, rule) == PAIR_AD else -1,
+    )
 
 
 @verb

@@ -11,8 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.ndimage import label as connected
 
+from imgquad_core.declared import POLICIES
 from imgquad_core.errors import InputError
+from imgquad_core.geometry.corner_rule import corner_rule
 from imgquad_core.model import VOID
+from imgquad_core.picture.clusters import labelled_clusters
 from imgquad_core.picture.noise import DenoiseOptions, automatic_limits, list_removed, remove_noise
 from support.labels import Labels, label_image
 
@@ -220,3 +223,18 @@ def test_a_large_noisy_picture_is_cleaned_to_its_grains() -> None:
     random = np.random.default_rng(4)
     noisy = np.where(random.random(clean.shape) < 0.05, random.integers(0, 5, clean.shape), clean)
     assert (cleaned(noisy, 16, 8) != clean).mean() < 0.003 < (noisy != clean).mean()
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_clusters_with_removed_pixels_are_counted_once_each(policy: str) -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        labels = rng.integers(0, 3, rng.integers(1, 30, 2)).astype(np.int32)
+        changed = rng.random(labels.shape) < rng.choice([0.02, 0.3])
+        before, after = label_image(labels), label_image(np.where(changed, (labels + 1) % 3, labels))
+        root = labelled_clusters(labels, corner_rule(policy)).parent
+        while (root != root[root]).any():
+            root = root[root]
+        touched = labels.ravel()[np.unique(root[changed.ravel()])]
+        found = {removal.material: removal.clusters for removal in list_removed(before, after, policy)}
+        assert found == {m: int((touched == m).sum()) for m in np.unique(labels[changed]).tolist()}
