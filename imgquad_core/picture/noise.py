@@ -138,7 +138,7 @@ def list_removed(
         zip(values.tolist(), _touched(colors, changed, len(values), corner_rule(policy, step)), strict=True)
     )
     return tuple(
-        Removal(int(m), before.materials.name_of(int(m)), int(clusters[m]), int(n))
+        Removal(int(m), before.materials.name_of(int(m)), clusters[m], int(n))
         for m, n in zip(materials.tolist(), pixels, strict=True)
     )
 
