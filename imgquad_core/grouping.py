@@ -52,3 +52,24 @@ def unite(parent: Ints | Labels, a: int, b: int) -> int:
         low, high = high, low
     parent[high] = low
     return high
+
+
+def linked(a: Ints, b: Ints, n: int) -> tuple[Ints, int]:
+    """Return the group of each of `n` things, numbered by their first ones, and how many; links join a[i] and b[i]."""
+    return _linked(np.ascontiguousarray(a, np.int64), np.ascontiguousarray(b, np.int64), n)
+
+
+@kernel
+def _linked(a: Ints, b: Ints, n: int) -> tuple[Ints, int]:
+    parent = np.arange(n)
+    for i in range(len(a)):
+        unite(parent, a[i], b[i])
+    group, count = np.empty(n, np.int64), 0
+    for k in range(n):
+        root = root_of(parent, k)
+        if root == k:
+            group[k] = count
+            count += 1
+        else:
+            group[k] = group[root]
+    return group, count

@@ -30,10 +30,15 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 #: versions of Numba whose inside `lowering` knows; with others kernels are the same, and take longer to compile
 KNOWN = ("0.68",)
 if numba.__version__.rpartition(".")[0] in KNOWN:
-    from .lowering import KernelCompiler, VerbCompiler
+    from .lowering import KernelCompiler, VerbCompiler, ready_to_load
 else:
     from numba.core.compiler import Compiler as KernelCompiler  # type: ignore[no-redef,unused-ignore]
     from numba.core.compiler import Compiler as VerbCompiler  # type: ignore[no-redef,unused-ignore]
+
+    def ready_to_load(context: Any) -> None:
+        """Make `context` ready for machine code that is loaded, as Numba does it."""
+        context.refresh()
+
 
 F = TypeVar("F")
 _KERNELS: list[Any] = []
@@ -148,7 +153,8 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was kept, or None."""
         try:
-            return super().load_overload(sig, target_context)
+            ready_to_load(target_context)
+            return self._load_overload(sig, target_context)
         except Exception:  # whatever code raises that another state of the package has left
             return None
 

@@ -3,6 +3,7 @@
 - A verb is called by kernels only, which hold a copy of it. It gets no machine code of its own, and is not optimised
   before it is part of a kernel.
 - References to arrays are counted only where arrays are made: elsewhere the caller holds all of them.
+- Machine code from disk is loaded without what compiling would need.
 - Which of its 50 kinds of sums an ``a + b`` is, is looked up once for each pair of types.
 """
 
@@ -15,6 +16,7 @@ from typing import Any
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
+from numba.core.runtime import rtsys
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering
 from numba.core.types.functions import BaseFunction
@@ -22,6 +24,11 @@ from numba.core.types.functions import BaseFunction
 _UNCOUNTED: dict[Any, Any] = {}  # Numba's own functions, compiled without counts
 _RESOLVED: dict[Any, tuple[BaseFunction, Any]] = {}
 _resolve = BaseFunction.get_call_type
+
+
+def ready_to_load(context: Any) -> None:
+    """Make `context` ready for machine code that is loaded: all that Numba can compile, 0.1 s, is not needed for it."""
+    rtsys.initialize(context)
 
 
 class _Part(JITCodeLibrary):  # type: ignore[misc]

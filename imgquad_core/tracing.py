@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from .arrays import Bytes, Flags, Floats, Ints, Labels
 from .errors import InputError
 from .geometry.halfedge import twins_of
+from .grouping import linked
 from .model import VOID, Materials, PointKind, QuadMesh
 
 SHARP = np.cos(np.radians(50.0))  #: a boundary that turns more at a node has a corner there
@@ -96,12 +95,10 @@ def _regions(twin: Ints, label: Labels) -> tuple[Ints, Labels]:
     """Find connected parts of one material, numbered by their first quads."""
     half = np.flatnonzero(twin >= 0)
     half = half[label[half // 4] == label[twin[half] // 4]]
-    graph = coo_array((np.ones(len(half), np.int8), (half // 4, twin[half] // 4)), shape=(len(label), len(label)))
-    found = connected_components(graph, directed=False)[1]
-    _, first, region = np.unique(found, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[region.ravel()], label[np.sort(first)]
+    region, n_regions = linked(half // 4, twin[half] // 4, len(label))
+    of_region = np.empty(n_regions, label.dtype)
+    of_region[region] = label
+    return region, of_region
 
 
 def _kinds(points: Floats, edges: Ints) -> Bytes:

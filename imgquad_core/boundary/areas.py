@@ -10,12 +10,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Floats, Ints
 from imgquad_core.chains import Places, places_of
+from imgquad_core.grouping import linked
 from imgquad_core.model import BoundaryGraph, Chains
 
 _STEPS = 5  # of Newton towards the wanted areas, at most; most end sooner, at `_GOOD`
@@ -126,21 +126,20 @@ def _shifts(weight: Floats, sides: Ints, missing: Floats, target: NDArray[Any]) 
     n = len(missing)
     free = np.flatnonzero((weight > 1e-9) & (sides[:, 0] != sides[:, 1]))
     left, right = np.where(sides[free] < 0, n, sides[free]).T
-    adjacency = sparse.coo_matrix((weight[free], (left, right)), (n + 1, n + 1)).tocsr()
+    adjacency = scipy.sparse.coo_matrix((weight[free], (left, right)), (n + 1, n + 1)).tocsr()
     adjacency = (adjacency + adjacency.T)[:, :]
-    wanted = _consistent(adjacency, np.append(missing, 0.0), np.append(target, 0.0))
+    wanted = _consistent(*linked(left, right, n + 1), np.append(missing, 0.0), np.append(target, 0.0))
     inner = adjacency[:n, :n]
     degree = np.asarray(adjacency.sum(axis=1)).ravel()[:n]
-    laplacian = sparse.diags(np.where(degree > 0, degree, 1.0)) - inner
+    laplacian = scipy.sparse.diags(np.where(degree > 0, degree, 1.0)) - inner
     potential = np.append(_conjugate_gradients(laplacian.tocsr(), wanted[:n]), 0.0)
     shift = np.zeros(len(weight))
     shift[free] = potential[right] - potential[left]
     return shift
 
 
-def _consistent(adjacency: Any, missing: Floats, target: Floats) -> Floats:
+def _consistent(group: Ints, n_groups: int, missing: Floats, target: Floats) -> Floats:
     """Take from each connected group of regions what no shift within it can give, from small regions by area."""
-    n_groups, group = connected_components(adjacency, directed=False)
     share = np.where(target < _SMALL, target, 1e-3 * target)
     spare = np.bincount(group, missing, n_groups) / np.maximum(np.bincount(group, share, n_groups), 1e-12)
     spare[group[-1]] = 0.0  # joined to the outside, which takes any area

@@ -16,10 +16,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Floats, Ints
+from imgquad_core.grouping import linked
 from imgquad_core.model import VOID, BoundaryGraph
 
 from .curves import curves_of, on_frame, rings
@@ -66,9 +65,8 @@ def _loops(graph: BoundaryGraph, walks: Ints) -> tuple[int, Ints]:
     following[ring[open_] ^ 1] = open_
     place = np.empty(len(ring), np.int64)
     place[walks] = np.arange(len(walks))
-    pairs = (np.ones(len(walks), bool), (np.arange(len(walks)), place[following[walks]]))
-    n_loops, loop = connected_components(sparse.coo_matrix(pairs, (len(walks),) * 2), directed=False)
-    return int(n_loops), loop.astype(np.int64)
+    loop, n_loops = linked(np.arange(len(walks)), place[following[walks]], len(walks))
+    return n_loops, loop
 
 
 def _swept(graph: BoundaryGraph) -> Floats:

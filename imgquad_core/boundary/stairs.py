@@ -19,8 +19,7 @@ from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
-from scipy.spatial import cKDTree
+import scipy
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.conflicts import CROSSING, UNITS, find_conflicts
@@ -149,7 +148,7 @@ def _swallow(chains: PixelChains, runs: _Runs, is_closed: Flags, side: Floats) -
         return found  # no detail is finer than a data point
     back, ahead = (_unit(runs, at) for at in (before, after))
     points = chains.graph.points
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     for k in np.flatnonzero(is_cut).tolist():
         near = points[tree.query_ball_point(corner[k], legs[k].max())] - corner[k]
         u, v = -(near * back[k]).sum(axis=1) / legs[k, 0], (near * ahead[k]).sum(axis=1) / legs[k, 1]
@@ -278,9 +277,15 @@ def _peak(spectrum: _Spectrum, least: float) -> _Peak:
     if low >= high:
         return _NO_PEAK
     least = max(least, _OF_HIGHEST * float(height[low : high + 1].max()))
-    is_peak = (height >= least) & (height == maximum_filter1d(height, 2 * _BESIDE + 1))
+    is_peak = (height >= least) & (height == _highest_near(height))
     found = low + np.flatnonzero(is_peak[low : high + 1])
     return _Peak(number / found[0], float(height[found[0]])) if len(found) else _NO_PEAK
+
+
+def _highest_near(height: Floats) -> Floats:
+    """Return the largest of each value and those up to `_BESIDE` places away."""
+    padded = np.pad(height, _BESIDE, constant_values=-np.inf)
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * _BESIDE + 1).max(axis=1))
 
 
 def _hexagon(along: _Spectrum, up: _Spectrum) -> float | None:

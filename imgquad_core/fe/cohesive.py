@@ -21,12 +21,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.halfedge import twins_of
+from imgquad_core.grouping import linked
 
 from .femesh import FEMesh
 
@@ -181,16 +180,13 @@ def _groups_of_corners(mesh: FEMesh, cut: Ints) -> Ints:
 
     Corners around a node are of one group where their elements share an edge that is not cut, or the seam.
     """
-    n = 4 * mesh.n_cells
     twin = _twins_of_sides(mesh)
     twin[cut] = -1
     tail = np.flatnonzero(twin >= 0)
     head_of_twin = twin[tail] // 4 * 4 + (twin[tail] + 1) % 4
     seam = [_corners_across(mesh, pairs) for pairs in mesh.periodic.values()]
     rows, columns = np.concatenate([np.stack([tail, head_of_twin]), *seam], axis=1)
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
-    group: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
-    return group
+    return linked(rows, columns, 4 * mesh.n_cells)[0]
 
 
 def _corners_across(mesh: FEMesh, pairs: Ints) -> Ints:

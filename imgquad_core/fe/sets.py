@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
 
 from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
@@ -179,6 +179,7 @@ def _at_interfaces(mesh: QuadMesh, names: dict[int, str]) -> dict[str, Ints]:
 
 def _touching(mesh: QuadMesh, ends: Ints, pair: Ints, n_pairs: int) -> tuple[Ints, Ints]:
     """(element, pair) for each element and pair of materials that have a node in common, each once."""
+    coo_array = scipy.sparse.coo_array
     on = coo_array((np.ones(2 * len(pair)), (ends.ravel(), np.repeat(pair, 2))), shape=(mesh.n_points, n_pairs))
     corners = np.repeat(np.arange(mesh.n_quads), 4)
     of = coo_array((np.ones(len(corners)), (corners, mesh.quads.ravel())), shape=(mesh.n_quads, mesh.n_points))

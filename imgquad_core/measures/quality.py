@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.declared import Declaration
 from imgquad_core.errors import QualityError
 from imgquad_core.geometry.halfedge import twins_of
+from imgquad_core.grouping import linked
 from imgquad_core.model import QuadMesh
 
 MIN_QUALITY = Declaration(0.0, "least scaled Jacobian that is asked for", float, least=-1.0, most=1.0)
@@ -175,10 +174,7 @@ def sectors_of(mesh: QuadMesh) -> Ints:
     twins = twins_of(mesh.quads, mesh.n_points)
     h = np.flatnonzero((twins >= 0) & ~_on_constraint(mesh))
     beside = twins[h] // 4 * 4 + (twins[h] + 1) % 4
-    n = 4 * mesh.n_quads
-    linked = coo_array((np.ones(len(h), bool), (h, beside)), shape=(n, n))
-    _, sector = connected_components(linked, directed=False)
-    return np.asarray(sector, np.int64).reshape(-1, 4)
+    return linked(h, beside, 4 * mesh.n_quads)[0].reshape(-1, 4)
 
 
 def sector_angles(mesh: QuadMesh) -> Floats:

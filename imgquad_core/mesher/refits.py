@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Flags, Ints
 from imgquad_core.chains import halved, refined, with_chains_of
 from imgquad_core.errors import TopologyError
+from imgquad_core.grouping import linked
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.model import BoundaryGraph
 
@@ -90,7 +89,7 @@ def _groups_across(graph: BoundaryGraph, chains: Flags) -> Ints:
     n = len(graph.region_label)
     pairs = graph.chain_regions[chains]
     a, b = pairs[(pairs >= 0).all(axis=1)].T
-    return np.asarray(connected_components(coo_array((np.ones(len(a)), (a, b)), (n, n)), False)[1], np.int64)
+    return linked(a, b, n)[0]
 
 
 def _finer(graph: BoundaryGraph, poor: Ints, attempt: int, tuning: Tuning) -> BoundaryGraph:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+import scipy
 
 from imgquad_core.arrays import Flags, Floats, Ints, Labels
 from imgquad_core.geometry.corner_rule import corner_rule
@@ -189,7 +189,7 @@ def _balanced(labels: Labels, stays: Flags, width: float) -> Labels:
     if 4 * len(materials) * labels.size > MOST_BYTES or len(materials) < 2:
         return labels
     density = np.stack(
-        [gaussian_filter((labels == m).astype(np.float32), width, truncate=BELL_ENDS) for m in materials]
+        [scipy.ndimage.gaussian_filter((labels == m).astype(np.float32), width, truncate=BELL_ENDS) for m in materials]
     )
     free = ~stays
     held = np.array([np.count_nonzero(stays & (labels == m)) for m in materials])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import binary_dilation, binary_erosion
+import scipy
 
 from imgquad_core.arrays import Flags
 
@@ -47,9 +47,9 @@ def _constant(levels: Levels, pixels: Flags, noise: float) -> Constant | None:
     if n < SHARE * pixels.size:
         return None
     square = np.ones((3, 3), bool)
-    if np.count_nonzero(binary_erosion(pixels, square, border_value=1)) < SOLID * n:
+    if np.count_nonzero(scipy.ndimage.binary_erosion(pixels, square, border_value=1)) < SOLID * n:
         return None
-    ring = binary_dilation(pixels, square) & ~pixels
+    ring = scipy.ndimage.binary_dilation(pixels, square) & ~pixels
     if not ring.any():
         return None
     r, c = np.nonzero(pixels)

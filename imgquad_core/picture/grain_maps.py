@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 import skimage
-from scipy.ndimage import label, maximum_filter, minimum_filter
 
 from imgquad_core.arrays import Bytes, Floats, Ints, Labels
 from imgquad_core.errors import InputError
@@ -48,11 +48,14 @@ def cores_of(plane: Bytes, noise: float, void: object = None) -> Cores:
         Pixels that belong to no grain.
     """
     channels = range(plane.shape[2])
-    spans = [maximum_filter(plane[..., k], 3) - minimum_filter(plane[..., k], 3) for k in channels]
+    spans = [
+        scipy.ndimage.maximum_filter(plane[..., k], 3) - scipy.ndimage.minimum_filter(plane[..., k], 3)
+        for k in channels
+    ]
     edges = np.maximum.reduce(spans)
     bound = max(EVEN, noise)
     flat = edges <= bound if void is None else (edges <= bound) & ~np.asarray(void)
-    labels, n = label(flat)
+    labels, n = scipy.ndimage.label(flat)
     pixels = np.bincount(labels.ravel(), minlength=n + 1)
     kept = pixels >= PIXELS
     kept[0] = False

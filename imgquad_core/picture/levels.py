@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from imgquad_core.arrays import Flags, Floats, Singles
 from imgquad_core.jit import kernel
@@ -148,7 +148,7 @@ def filled(values: NDArray[Any], void: Flags | None) -> NDArray[Any]:
     """Return values with those of void pixels replaced by the nearest that is not void."""
     if void is None or not void.any() or void.all():
         return values
-    r, c = distance_transform_edt(void, return_distances=False, return_indices=True)
+    r, c = scipy.ndimage.distance_transform_edt(void, return_distances=False, return_indices=True)
     return np.asarray(values[r, c])
 
 

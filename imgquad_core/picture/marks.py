@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 import skimage
 from numpy.typing import ArrayLike, NDArray
 
@@ -158,12 +159,10 @@ def grow_from(levels: Levels, marks: Marks, learn: bool = False) -> LabelImage:
 
 def _gradient(levels: Levels) -> Singles:
     """Return the gradient's length at two scales, added, all channels together, of the picture without noise."""
-    from scipy.ndimage import gaussian_filter
-
     noise = noise_of(levels)
     found = np.empty(levels.shape, np.float32)
     for strip in filtered_strips(levels, noise):
-        coarse = gaussian_filter(strip.shades, (COARSE, COARSE, 0.0))
+        coarse = scipy.ndimage.gaussian_filter(strip.shades, (COARSE, COARSE, 0.0))
         both = FINE * np.sqrt(squared_gradient(strip.shades)) + np.sqrt(squared_gradient(coarse))
         found[strip.place] = both[strip.own]
     return found

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 import skimage
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
 from imgquad_core.jit import kernel
@@ -170,7 +170,7 @@ def _settled(points: Floats, weights: Floats, centres: Floats, steps: int) -> Fl
 
 def distances2(points: Floats, centres: Floats) -> Floats:
     """Return squared distances, shape (n_points, n_centres)."""
-    return np.asarray(cdist(points, centres, "sqeuclidean"), float)
+    return np.asarray(scipy.spatial.distance.cdist(points, centres, "sqeuclidean"), float)
 
 
 def errors_of(points: Floats, weights: Floats, found: list[Floats]) -> Floats:

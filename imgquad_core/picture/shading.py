@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import binary_erosion, gaussian_filter, maximum_filter, minimum_filter
+import scipy
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 
@@ -80,10 +80,10 @@ def _span(levels: Levels, coefficients: Floats) -> float:
 
 def _flat_places(plane: Bytes, noise: float, without: Flags | None) -> tuple[Ints, ...]:
     """Return rows and columns of flat pixels, evenly thinned."""
-    flat = maximum_filter(plane, 3) - minimum_filter(plane, 3) <= max(2.0, noise)
+    flat = scipy.ndimage.maximum_filter(plane, 3) - scipy.ndimage.minimum_filter(plane, 3) <= max(2.0, noise)
     if without is not None:
         flat &= ~without
-    flat = binary_erosion(flat, np.ones((3, 3), bool), iterations=MARGIN)
+    flat = scipy.ndimage.binary_erosion(flat, np.ones((3, 3), bool), iterations=MARGIN)
     found = np.flatnonzero(flat)
     found = found[:: max(1, -(-len(found) // POINTS))]
     return found // plane.shape[1], found % plane.shape[1]
@@ -92,7 +92,7 @@ def _flat_places(plane: Bytes, noise: float, without: Flags | None) -> tuple[Int
 def _gradients(levels: Levels, places: tuple[Ints, ...]) -> tuple[Floats, Floats, Floats]:
     """Return the smoothed picture, and its derivatives along columns and rows."""
     r, c = places
-    smooth = gaussian_filter(levels.rows(0, levels.shape[0])[..., 0], GAUSS)
+    smooth = scipy.ndimage.gaussian_filter(levels.rows(0, levels.shape[0])[..., 0], GAUSS)
     by_x = (smooth[r, c + 1].astype(float) - smooth[r, c - 1]) / 2.0
     by_y = (smooth[r + 1, c].astype(float) - smooth[r - 1, c]) / 2.0
     return smooth[r, c].astype(float), by_x, by_y

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import binary_dilation, label, uniform_filter1d
+import scipy
 
 from imgquad_core.arrays import Bytes, Flags, Floats
 
@@ -38,9 +38,7 @@ def tails_of(plane: Bytes, support: Flags, means: Floats, noise: float, constant
     constant : bool, shape (n_rows, n_cols), optional
         Pixels of constant values: what is beside them may be blurred towards them, and is no phase.
     """
-    from scipy.ndimage import binary_dilation
-
-    free = None if constant is None else ~binary_dilation(constant, iterations=AROUND)
+    free = None if constant is None else ~scipy.ndimage.binary_dilation(constant, iterations=AROUND)
     weights = np.bincount(plane[support], minlength=256).astype(float)
     nearest = np.abs(np.arange(256.0)[:, None] - means[None]).argmin(axis=1)
     gap = OF_GAP * float(np.diff(means).min()) if len(means) > 1 else 0.0
@@ -72,7 +70,7 @@ def _middle_and_deviation(weights: Floats) -> tuple[float, float]:
 def _valley(weights: Floats, middle: float, deviation: float) -> float:
     """Return how far above `middle` the valley before another peak of a histogram lies; inf where there is none."""
     first = int(np.ceil(middle + FOOT * deviation))
-    beyond = uniform_filter1d(weights, AVERAGED)[first:]
+    beyond = scipy.ndimage.uniform_filter1d(weights, AVERAGED)[first:]
     if len(beyond) == 0:
         return np.inf
     peaks = np.flatnonzero(beyond > VALLEY * np.minimum.accumulate(beyond))
@@ -89,7 +87,7 @@ def _level_of(plane: Bytes, beyond: Flags, support: Flags, middle: float) -> flo
     """
     if np.count_nonzero(beyond) < SHARE * plane.size:
         return None
-    parts, n = label(beyond)
+    parts, n = scipy.ndimage.label(beyond)
     pixels = np.bincount(parts.ravel(), minlength=n + 1)
     firm = np.bincount(parts[support], minlength=n + 1)
     kept = (pixels >= PIXELS) & (firm > 0)
@@ -103,6 +101,6 @@ def _level_of(plane: Bytes, beyond: Flags, support: Flags, middle: float) -> flo
 
 def _ends_at_edges(plane: Bytes, inside: Flags, level: float, middle: float) -> bool:
     """Whether most pixels that are `AROUND` away from a part lie less than half way from `middle` to its level."""
-    near = binary_dilation(inside, iterations=AROUND - 1)
-    around = plane[binary_dilation(near) & ~near]
+    near = scipy.ndimage.binary_dilation(inside, iterations=AROUND - 1)
+    around = plane[scipy.ndimage.binary_dilation(near) & ~near]
     return len(around) == 0 or abs(level - middle) > 2.0 * float(np.median(around) - middle) * np.sign(level - middle)

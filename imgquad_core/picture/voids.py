@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import label
+import scipy
 
 from imgquad_core.arrays import Ints, Labels
 from imgquad_core.model import VOID, LabelImage
@@ -38,7 +38,7 @@ def fill_void(image: LabelImage, pixels: int) -> LabelImage:
 
 def void_clusters(labels: Labels) -> tuple[Labels, Ints]:
     """Return the void cluster of each pixel, from 1 (0: none), and the pixels of each cluster (0 for number 0)."""
-    clusters, n = label(labels == VOID)
+    clusters, n = scipy.ndimage.label(labels == VOID)
     sizes = np.bincount(clusters.ravel(), minlength=n + 1)
     sizes[0] = 0
     return np.asarray(clusters, np.int32), sizes

@@ -16,11 +16,10 @@ from functools import cache
 from math import cos, pi, sin, sqrt
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Flags, Floats, Ints, Labels
 from imgquad_core.errors import InputError
+from imgquad_core.grouping import linked
 
 #: about this many pairs of pixels are compared at once (24 symmetries of 8 bytes each: 25 MB)
 AT_ONCE = 1 << 17
@@ -163,10 +162,8 @@ def find_grains(phase: Labels, quaternions: Floats, laue: Mapping[int, str], thr
     if not 0.0 < threshold <= 180.0:
         raise InputError(f"grain-angle is {threshold}: give degrees above 0, up to 180")
     links = _links(phase, quaternions, laue, threshold * pi / 180.0)
-    size = (phase.size, phase.size)
-    graph = coo_matrix((np.ones(len(links), np.bool_), links.T), shape=size)
-    _, part = connected_components(graph, directed=False)
-    return _in_reading_order(part.reshape(phase.shape), phase >= 0)
+    part, _ = linked(links[:, 0], links[:, 1], phase.size)
+    return _in_reading_order(part.astype(np.int32).reshape(phase.shape), phase >= 0)
 
 
 def _links(phase: Labels, quaternions: Floats, laue: Mapping[int, str], threshold: float) -> Ints:

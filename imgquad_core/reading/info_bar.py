@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags
@@ -72,10 +73,9 @@ def find_scale(picture: Picture) -> Box | None:
 
 
 def _long_box(drawn: Flags) -> Box | None:
-    from scipy.ndimage import find_objects, label
 
-    parts, _ = label(drawn)
-    for k, (down, along) in enumerate(find_objects(parts), start=1):
+    parts, _ = scipy.ndimage.label(drawn)
+    for k, (down, along) in enumerate(scipy.ndimage.find_objects(parts), start=1):
         height, width = down.stop - down.start, along.stop - along.start
         is_long = height > 1 and width >= WIDE * drawn.shape[1] and width >= LONG * height
         if is_long and np.count_nonzero(parts[down, along] == k) >= FULL * height * width:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
@@ -165,7 +165,7 @@ def _seeds(faces: FaceQuads, points: Floats, near: Flags) -> Flags:
         return np.zeros(len(faces.points), bool)
     quads = faces.points[faces.quads]
     edge = float(np.median(np.hypot(*(quads[:, 1] - quads[:, 0]).T)))
-    return np.asarray(cKDTree(points[near]).query(faces.points)[0] <= 1.25 * edge)
+    return np.asarray(scipy.spatial.cKDTree(points[near]).query(faces.points)[0] <= 1.25 * edge)
 
 
 def _relaxed(part: FaceQuads) -> FaceQuads:

@@ -16,11 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Flags, Ints, Labels
 from imgquad_core.boundary import ExtractionOptions, label_regions
+from imgquad_core.grouping import linked
 from imgquad_core.model import VOID
 
 from .grid import Box, Grid
@@ -116,8 +115,7 @@ def joined_regions(grid: Grid, tiles: list[TileRegions]) -> Regions:
     offsets = np.concatenate([[0], np.cumsum([len(tile.label) for tile in tiles])]).astype(np.int64)
     pairs = [_shared(grid, t, tiles, offsets) for t in range(grid.n_tiles)]
     a, b = np.concatenate(pairs, axis=1) if pairs else np.empty((2, 0), np.int64)
-    n = int(offsets[-1])
-    n_sets, of = connected_components(coo_array((np.ones(len(a), bool), (a, b)), (n, n)), directed=False)
+    of, n_sets = linked(a, b, int(offsets[-1]))
 
     def total(how: np.ufunc, name: str, start: int) -> NDArray[np.int64]:
         values = np.concatenate([getattr(tile, name) for tile in tiles])

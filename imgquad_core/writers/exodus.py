@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.io import netcdf_file, netcdf_variable
 
 from imgquad_core.arrays import Ints
 from imgquad_core.fe.femesh import FEMesh
@@ -39,7 +39,7 @@ def write_exodus(mesh: FEMesh, path: str | Path) -> None:
         Six-node cohesive elements, or a name of more than 255 signs.
     """
     refuse_six_nodes(mesh, "Exodus")
-    with replacing(path) as temporary, netcdf_file(str(temporary), "w", version=2) as file:
+    with replacing(path) as temporary, scipy.io.netcdf_file(str(temporary), "w", version=2) as file:
         _heading(file, mesh)
         position = _blocks(file, mesh)
         _node_sets(file, mesh)
@@ -126,6 +126,6 @@ def _put(file: Any, name: str, kind: str, dimensions: tuple[str, ...], values: N
     set in the file with the n-th name.
     """
     data = np.ascontiguousarray(values, np.dtype(kind).newbyteorder(">"))
-    variable = netcdf_variable(data, kind, data.itemsize, (1,), dimensions)
+    variable = scipy.io.netcdf_variable(data, kind, data.itemsize, (1,), dimensions)
     file.variables[name] = variable
     return variable

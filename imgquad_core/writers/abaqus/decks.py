@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
 from imgquad_core.fe.femesh import KINDS, FEMesh
 from imgquad_core.fe.properties import Properties, values_of
+from imgquad_core.grouping import linked
 from imgquad_core.writers.common import real
 
 from .equations import STRAIN, periodic_deck
@@ -119,7 +118,6 @@ def _parts(mesh: FEMesh) -> list[Ints]:
     links = [mesh.cells[:, [0, other]] for other in range(1, KINDS[mesh.kind].n_nodes)]
     links += [mesh.cohesive[:, [0, other]] for other in range(1, mesh.cohesive.shape[1])]
     pairs = np.concatenate(links)
-    graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(mesh.n_points,) * 2)
-    n_parts, part_of = connected_components(graph, directed=False)
+    part_of, n_parts = linked(pairs[:, 0], pairs[:, 1], mesh.n_points)
     order = np.argsort(part_of, kind="stable")
     return np.split(order, np.cumsum(np.bincount(part_of, minlength=n_parts))[:-1])

@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from imgquad_core.errors import QualityError
 from imgquad_core.geometry.halfedge import components, twins_of
+from imgquad_core.grouping import linked
 from imgquad_core.measures.quality import corner_angles, material_areas, quad_areas, scaled_jacobian
 from imgquad_core.model import VOID, QuadMesh
 from imgquad_core.whole_files import scratch_folder
@@ -248,8 +247,6 @@ def touching_points(mesh: QuadMesh) -> int:
     twins = twins_of(mesh.quads, mesh.n_points)
     h = np.flatnonzero(twins >= 0)
     after = twins[h] // 4 * 4 + (twins[h] + 1) % 4  # corner beyond edge h, at the same point
-    n = 4 * mesh.n_quads
-    links = coo_array((np.ones(len(h), bool), (h, after)), shape=(n, n))
-    _, fan = connected_components(links, directed=False)
+    fan, _ = linked(h, after, 4 * mesh.n_quads)
     fans = np.unique(np.stack([mesh.quads.ravel(), fan], axis=1), axis=0)
     return int(np.count_nonzero(np.bincount(fans[:, 0]) > 1))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.fe import FEMesh
@@ -92,7 +92,7 @@ def _moved(run: Run) -> float:
     """Return the largest distance of a boundary from those of the picture without noise, in pixels."""
     before, after = extract_boundaries(run.clean), run.boundary
     to_pixels = np.array(run.clean.shape[::-1]) / np.array(after.shape[::-1])
-    return float(cKDTree(before.points).query(after.points * to_pixels)[0].max())
+    return float(scipy.spatial.cKDTree(before.points).query(after.points * to_pixels)[0].max())
 
 
 def element_notes(made: FEMesh | None, path: Path, msh_version: str | None = None) -> Iterator[str]:

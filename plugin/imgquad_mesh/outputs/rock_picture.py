@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from PIL import Image
-from scipy.spatial import cKDTree
 
 PALETTE = ((222, 203, 164), (178, 116, 88), (120, 140, 150), (84, 92, 70), (245, 245, 240), (35, 45, 70))
 VEIN, PORE = 4, 5
@@ -59,5 +59,5 @@ def _grains(rng: np.random.Generator, x: NDArray[np.float64], y: NDArray[np.floa
     centres = np.stack(np.meshgrid(np.arange(-1, cols // grain + 2), np.arange(-1, rows // grain + 2)), axis=-1)
     seeds = (centres.reshape(-1, 2) + rng.uniform(0.1, 0.9, (centres.shape[0] * centres.shape[1], 2))) * grain
     wavy = np.stack([x + 4 * np.sin(y / 13), y + 4 * np.sin(x / 17)], axis=-1)
-    nearest = cKDTree(seeds).query(wavy.reshape(-1, 2))[1].reshape(x.shape)
+    nearest = scipy.spatial.cKDTree(seeds).query(wavy.reshape(-1, 2))[1].reshape(x.shape)
     return np.asarray(rng.integers(0, 4, len(seeds))[nearest], np.uint8)
