@@ -1,15 +1,14 @@
 from .grids import boundaries_of_mesh, optimize, plot, quadratic, quality, report
-from .images import (
-    boundaries,
+from .images import boundaries, mesh
+from .lines import quads, smooth
+from .materials import (
     drop_materials,
     merge_materials,
-    mesh,
     recolor_materials,
     remove_noise,
     rename_materials,
     segment,
 )
-from .lines import quads, smooth
 
 __all__ = [
     "boundaries",

@@ -11,10 +11,10 @@ import pyvista as pv
 import imgquad_core as core
 from imgquad_mesh import datasets
 
+from .parameter_types import Effort
 from .parameters import checked, choice, progress_of
 from .plotting import MEASURES, add_to_plotter
 
-Effort: TypeAlias = Literal["fast", "normal", "best"]
 Grid: TypeAlias = "pv.UnstructuredGrid | pv.PolyData"
 
 

@@ -10,8 +10,8 @@ import imgquad_core as core
 from imgquad_core.errors import InputError
 from imgquad_mesh import datasets
 
-from .grids import Effort
-from .images import MaterialSizes, Periodic, SizesBetween, Step, Triangulator, Unit, in_pixels
+from .images import in_pixels
+from .parameter_types import Effort, MaterialSizes, Periodic, SizesBetween, Step, Triangulator, Unit
 from .parameters import checked, progress_of
 
 
