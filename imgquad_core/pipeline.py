@@ -213,7 +213,6 @@ def run(
     smoothing = options.smoothing(picture.materials, (step[0] * absorbed.times, step[1] * absorbed.times))
     meshing = options.meshing(picture.materials)
     true = true_shape(labels.shape, options.pixel_sides)
-    _assert_feasible(true.shape, smoothing.size)
     with timed("boundary"):
         extraction = ExtractionOptions(options.policy, noise.step * absorbed.times)
         staircase = made("pixel_boundary", extract_simplified, clean, absorbed, options.drop, extraction)

@@ -134,12 +134,11 @@ def list_removed(
     materials, pixels = np.unique(before.labels.ravel()[changed], return_counts=True)
     values, colors = _ranked(before)
     # all of a cluster counts, even if some is kept: what is recoloured first may part others at a corner
-    clusters = dict(
-        zip(values.tolist(), _touched(colors, changed, len(values), corner_rule(policy, step)), strict=True)
-    )
+    counts = _touched(colors, changed, len(values), corner_rule(policy, step))
+    clusters = dict(zip(values.tolist(), counts.tolist(), strict=True))
     return tuple(
-        Removal(int(m), before.materials.name_of(int(m)), clusters[m], int(n))
-        for m, n in zip(materials.tolist(), pixels, strict=True)
+        Removal(m, before.materials.name_of(m), clusters[m], n)
+        for m, n in zip(materials.tolist(), pixels.tolist(), strict=True)
     )
 
 

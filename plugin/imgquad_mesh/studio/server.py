@@ -28,7 +28,7 @@ from imgquad_core.fe import ElementOptions
 from imgquad_core.options import MeshOptions
 
 from .recipe import recipe_of, safe_name
-from .sessions import Busy, Limits, Sessions, start_fork_server
+from .sessions import Busy, Limits, Session, Sessions, start_fork_server
 
 WWW = Path(__file__).with_name("www")
 TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
@@ -161,53 +161,65 @@ def make_app(place: Place, sessions: Sessions, picture: Path | None = None) -> A
     picture : Path, optional
         A picture to open at the start.
     """
-    files = {path.name: path.read_bytes() for path in WWW.iterdir() if path.suffix in TYPES}
+    answers = _Answers(place, sessions, picture)
+    posts = ("options", "given", "picture", "marks", "texts", "do", "close")
+    routes = [Route("/", answers.page), Route("/{name}", answers.static)]
+    routes += [Route(f"/{name}", _told(getattr(answers, name)), methods=["POST"]) for name in posts]
+    return Guard(Starlette(routes=routes, lifespan=answers.lifespan), place)
 
-    async def page(request: Request) -> Response:
-        response = Response(files["index.html"], media_type="text/html")
-        if secrets.compare_digest(request.query_params.get("token", "").encode(), place.token.encode()):
-            response.set_cookie(place.cookie, place.token, httponly=True, samesite="strict")
+
+class _Answers:
+    """What the page is answered; each method is a route of its name."""
+
+    def __init__(self, place: Place, sessions: Sessions, opened: Path | None) -> None:
+        self._place, self._sessions, self._opened = place, sessions, opened
+        self._files = {path.name: path.read_bytes() for path in WWW.iterdir() if path.suffix in TYPES}
+
+    async def page(self, request: Request) -> Response:
+        response = Response(self._files["index.html"], media_type="text/html")
+        if secrets.compare_digest(request.query_params.get("token", "").encode(), self._place.token.encode()):
+            response.set_cookie(self._place.cookie, self._place.token, httponly=True, samesite="strict")
         return response
 
-    async def static(request: Request) -> Response:
+    async def static(self, request: Request) -> Response:
         name = request.path_params["name"]
-        if name not in files:
+        if name not in self._files:
             return _no(404, "there is no such file")
-        return Response(files[name], media_type=TYPES[Path(name).suffix])
+        return Response(self._files[name], media_type=TYPES[Path(name).suffix])
 
-    async def options(request: Request) -> Response:
-        told = {"options": _declared(), "given": picture.name if picture else None}
+    async def options(self, request: Request) -> Response:
+        told = {"options": _declared(), "given": self._opened.name if self._opened else None}
         return JSONResponse(told | {"learns": find_spec("sklearn") is not None})
 
-    async def given(request: Request) -> Response:
-        if picture is None:
+    async def given(self, request: Request) -> Response:
+        if self._opened is None:
             return _no(404, "no picture was given")
-        data = await asyncio.to_thread(picture.read_bytes)
+        data = await asyncio.to_thread(self._opened.read_bytes)
         return Response(data, media_type="application/octet-stream")
 
-    async def take(request: Request) -> Response:
-        session = sessions.of(request.headers["x-tab"])
+    async def picture(self, request: Request) -> Response:
+        session = self._session(request)
         name = safe_name(request.query_params.get("name", ""))
         path = session.new_file(next((end for end in KNOWN if name.lower().endswith(end)), ".picture"))
-        await _save(request, path, sessions.limits)
+        await _save(request, path, self._sessions.limits)
         async with session.lock:
             session.took(path, name)
         return JSONResponse({"name": name})
 
-    async def take_marks(request: Request) -> Response:
-        session = sessions.of(request.headers["x-tab"])
+    async def marks(self, request: Request) -> Response:
+        session = self._session(request)
         path = session.new_file(".picture")
-        await _save(request, path, sessions.limits)
+        await _save(request, path, self._sessions.limits)
         async with session.lock:
             session.took_marks(path)
         return JSONResponse({})
 
-    async def texts(request: Request) -> Response:
-        return JSONResponse(recipe_of((await _json(request, sessions.limits)).get("recipe")).texts)
+    async def texts(self, request: Request) -> Response:
+        return JSONResponse(recipe_of((await _json(request, self._sessions.limits)).get("recipe")).texts)
 
-    async def do(request: Request) -> Response:
-        task = await _json(request, sessions.limits)
-        session = sessions.of(request.headers["x-tab"])
+    async def do(self, request: Request) -> Response:
+        task = await _json(request, self._sessions.limits)
+        session = self._session(request)
         if task.get("do") not in ("segment", "denoise", "smooth", "mesh", "write", "look", "rock"):
             raise InputError("the studio does nothing of this name")
         if session.picture is None and task["do"] != "rock":
@@ -215,22 +227,20 @@ def make_app(place: Place, sessions: Sessions, picture: Path | None = None) -> A
         recipe_of(task.get("recipe"))  # refused here rather than in a process
         return StreamingResponse(_one_at_a_time(session, task), media_type="application/x-ndjson")
 
-    async def close(request: Request) -> Response:
-        sessions.forget(request.headers["x-tab"])
+    async def close(self, request: Request) -> Response:
+        self._sessions.forget(request.headers["x-tab"])
         return JSONResponse({})
 
     @asynccontextmanager
-    async def lifespan(app: Starlette) -> AsyncIterator[None]:
+    async def lifespan(self, app: Starlette) -> AsyncIterator[None]:
         start_fork_server()
-        reaper = asyncio.create_task(sessions.reap())
+        reaper = asyncio.create_task(self._sessions.reap())
         yield
         reaper.cancel()
-        sessions.end()
+        self._sessions.end()
 
-    posts = {"/options": options, "/given": given, "/picture": take, "/marks": take_marks, "/texts": texts, "/do": do}
-    routes = [Route("/", page), Route("/{name}", static)]
-    routes += [Route(path, _told(answer), methods=["POST"]) for path, answer in {**posts, "/close": close}.items()]
-    return Guard(Starlette(routes=routes, lifespan=lifespan), place)
+    def _session(self, request: Request) -> Session:
+        return self._sessions.of(request.headers["x-tab"])
 
 
 class _Server(uvicorn.Server):

@@ -162,6 +162,7 @@ def test_the_ledger_lists_clusters_and_pixels_by_material() -> None:
     before = label_image(labels)
     after = remove_noise(before, DenoiseOptions(10, 10))
     found = {(r.name, r.material, r.clusters, r.pixels) for r in list_removed(before, after)}
+    assert all(type(number) is int for _, *numbers in found for number in numbers)  # so that JSON takes them
     assert found == {("m5", 5, 2, 3), ("m1000000007", 1_000_000_007, 1, 4)}
     assert (after.labels[3:7, 12:16] == 9).all()
 
