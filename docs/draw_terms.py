@@ -1,4 +1,4 @@
-"""Draw the small pictures of docs/terms.md and docs/how_it_works.md: python docs/draw_terms.py [FOLDER].
+"""Draw the small pictures of docs/develop/terms.md and docs/how_it_works.md: python docs/draw_terms.py [FOLDER].
 
 All of it is made by the stages themselves from one small picture: grains around a vein, with a pore.
 """

@@ -1,4 +1,18 @@
-from . import boundary, cleanup, declared, fe, geometry, measures, mesher, picture, pipeline, remedies, tracing, writers
+from . import (
+    boundary,
+    cleanup,
+    declared,
+    fe,
+    geometry,
+    measures,
+    mesher,
+    picture,
+    pipeline,
+    reading,
+    remedies,
+    tracing,
+    writers,
+)
 from .model import BoundaryGraph, LabelImage, Materials, QuadMesh
 from .options import MeshOptions
 from .pipeline import Run, mesh_image, run
@@ -20,6 +34,7 @@ __all__ = [
     "mesher",
     "picture",
     "pipeline",
+    "reading",
     "remedies",
     "run",
     "tracing",

@@ -23,7 +23,7 @@ from imgquad_core.jit import kernel, verb
 
 from .curves import Curves, Ends, numbered
 
-_LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing one level coarser
+_LONG = 2.3  # coarse segments from which a piece gets an even number of them, for meshing on the next stride
 _SHORT = 0.7  # the same beside a corner: a short piece there would keep both faces of a long chain from that
 _COARSE = 0.3  # mean size over asked size from which that is of use
 _VERY_LONG = 30.0  # coarse segments from which their number may be made a multiple of six
@@ -228,7 +228,7 @@ class Nodes(NamedTuple):
     placed: Placement
 
 
-class Level(NamedTuple):
+class Strided(NamedTuple):
     """Polylines through all nodes (final edges), or through every second one (coarse)."""
 
     chain_points: Ints
@@ -246,7 +246,7 @@ def number_nodes(curves: Curves, n_ends: int, xy: Floats, placed: Placement) -> 
     return Nodes(points, ids, placed)
 
 
-def level_of(nodes: Nodes, step: int) -> Level:
+def on_stride(nodes: Nodes, step: int) -> Strided:
     """Take every `step`-th node of each chain."""
     offsets = nodes.placed.offsets
     within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], np.diff(offsets))
@@ -258,19 +258,19 @@ def level_of(nodes: Nodes, step: int) -> Level:
     inside = np.ones(len(pairs), bool)
     inside[starts[1:-1] - 1] = False
     chain = np.repeat(np.arange(len(counts)), counts)
-    return Level(chain_points, starts, pairs[inside], chain, nodes.placed.at[taken])
+    return Strided(chain_points, starts, pairs[inside], chain, nodes.placed.at[taken])
 
 
 def mark_conflicts(
-    points: Floats, level: Level, ends: Ends, is_new: Flags, gently: bool, shape: tuple[float, float], units: float
+    points: Floats, strided: Strided, ends: Ends, is_new: Flags, gently: bool, shape: tuple[float, float], units: float
 ) -> Bytes:
-    """Mark the segments of a level that cross or touch; `gently` also those too close or at too sharp sectors.
+    """Mark the segments that cross or touch; `gently` also those too close or at too sharp sectors.
 
     Only pairs with a segment on a chain of `is_new` are tested for the former.
     """
-    marks = find_conflicts(points, level.segments, level.chain, is_new, shape, units)
+    marks = find_conflicts(points, strided.segments, strided.chain, is_new, shape, units)
     if gently:
-        mark_sharp(points, level.chain_points, level.offsets, ends.offsets, ends.sockets, _LEAST_SECTOR, marks)
+        mark_sharp(points, strided.chain_points, strided.offsets, ends.offsets, ends.sockets, _LEAST_SECTOR, marks)
     else:
         marks[marks < CROSSING] = 0
     return marks

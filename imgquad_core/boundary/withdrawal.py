@@ -20,7 +20,17 @@ from imgquad_core.model import Chains
 from .areas import mitres, restore_areas
 from .curves import Curves, Ends, arc_lengths, per_point, pin_ends
 from .edge_sizes import grade_along, grade_chains
-from .nodes import Level, Nodes, any_of_chain, even_out, level_of, mark_conflicts, number_nodes, place_nodes, points_at
+from .nodes import (
+    Nodes,
+    Strided,
+    any_of_chain,
+    even_out,
+    mark_conflicts,
+    number_nodes,
+    on_stride,
+    place_nodes,
+    points_at,
+)
 
 _CLOSER, _LESS_CLOSE = 0.6, 0.8  # factors on the wanted length, at crossings and at sharp sectors
 _CLOSEST = 0.25  # px, least wanted length of an edge: half the 0.5 px of thin places, as pixels leave 0.7 px
@@ -85,9 +95,9 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         gently = attempt < patience.gentle
         nodes = _place(draft, size, at_least, exact, withdrawn)
         factor, pull = np.ones(len(size)), np.zeros(len(size))
-        for level in (level_of(nodes, 2), level_of(nodes, 1)):
-            marks = mark_conflicts(nodes.points, level, draft.ends, is_new, gently, draft.shape, draft.units)
-            _mark_dense(marks, level, curves.offsets, attempt >= patience.closer, factor, pull)
+        for strided in (on_stride(nodes, 2), on_stride(nodes, 1)):
+            marks = mark_conflicts(nodes.points, strided, draft.ends, is_new, gently, draft.shape, draft.units)
+            _mark_dense(marks, strided, curves.offsets, attempt >= patience.closer, factor, pull)
         if factor.min() == 1.0:
             return nodes, gently
         failed = any_of_chain(factor < 1.0, curves.offsets)
@@ -138,12 +148,12 @@ def _withdraw_ends(draft: Draft, withdrawn: Floats) -> Floats:
     return draft.node + share[:, None] * (draft.ends.place - draft.node)
 
 
-def _mark_dense(marks: Bytes, level: Level, offsets: Ints, withdraw: bool, factor: Floats, pull: Floats) -> None:
+def _mark_dense(marks: Bytes, strided: Strided, offsets: Ints, withdraw: bool, factor: Floats, pull: Floats) -> None:
     """For the dense points under marked segments: how much closer nodes go, and how much nearer to the pixels."""
     k = np.flatnonzero(marks)
-    c = level.chain[k]
-    low = np.maximum(level.at[k + c].astype(np.int64) - 1, offsets[c])
-    high = np.minimum(level.at[k + c + 1].astype(np.int64) + 2, offsets[c + 1] - 1)
+    c = strided.chain[k]
+    low = np.maximum(strided.at[k + c].astype(np.int64) - 1, offsets[c])
+    high = np.minimum(strided.at[k + c + 1].astype(np.int64) + 2, offsets[c + 1] - 1)
     number = high - low + 1
     under = np.arange(number.sum()) + np.repeat(low - np.cumsum(number) + number, number)
     sharp = np.repeat(marks[k] == SHARP, number)
@@ -184,16 +194,18 @@ def restore_areas_freely(
     bound = _area_bounds(draft.curves, nodes, room, max_shift)
     shift, tested = np.zeros(len(sides)), nodes.points
     had_conflicts = np.zeros(len(sides), bool)
-    levels = [(level, _excused(draft, nodes, level, gently)) for level in (level_of(nodes, 2), level_of(nodes, 1))]
+    both = [
+        (strided, _excused(draft, nodes, strided, gently)) for strided in (on_stride(nodes, 2), on_stride(nodes, 1))
+    ]
     for attempt in range(_AREA_ROUNDS):
         points, shift = restore_areas(nodes.points, chains, areas, bound, shift)
         points = snapped(points, draft.units)
         has_moved = any_of_chain((points != tested).any(axis=1)[nodes.chain_points], placed.offsets)
         has_moved |= had_conflicts
         is_bad = np.zeros(len(points), bool)
-        for level, is_excused in levels:
-            marks = mark_conflicts(points, level, draft.ends, has_moved, True, draft.shape, draft.units)
-            is_bad[level.segments[marks > np.where(is_excused, CROSSING - 1, FREE)]] = True
+        for strided, is_excused in both:
+            marks = mark_conflicts(points, strided, draft.ends, has_moved, True, draft.shape, draft.units)
+            is_bad[strided.segments[marks > np.where(is_excused, CROSSING - 1, FREE)]] = True
         if not is_bad.any():
             return nodes._replace(points=points)
         bound[_widened(is_bad[nodes.chain_points])] *= 0.5 if attempt == 0 else 0.0
@@ -201,12 +213,12 @@ def restore_areas_freely(
     return nodes
 
 
-def _excused(draft: Draft, nodes: Nodes, level: Level, gently: bool) -> Flags:
+def _excused(draft: Draft, nodes: Nodes, strided: Strided, gently: bool) -> Flags:
     """Tell which segments are too close to others or at too sharp sectors before areas are restored."""
     if gently:
-        return np.zeros(len(level.segments), bool)
+        return np.zeros(len(strided.segments), bool)
     all_chains = np.ones(len(draft.curves.ends), bool)
-    return np.asarray(mark_conflicts(nodes.points, level, draft.ends, all_chains, True, draft.shape, draft.units) > 0)
+    return np.asarray(mark_conflicts(nodes.points, strided, draft.ends, all_chains, True, draft.shape, draft.units) > 0)
 
 
 def _widened(flags: Flags) -> Flags:

@@ -22,7 +22,7 @@ from .options import CleanUp, OptimizationOptions
 from .relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
 from .strips import nodes_around
 
-EFFORTS = {
+CLEAN_UPS = {
     "fast": CleanUp((16,), 0.2, 0.6),
     "normal": CleanUp((16, 40, 80), 0.2, 0.6),
     "best": CleanUp((16, 40, 80, 160), 0.4, 0.6),
@@ -51,7 +51,7 @@ def optimize(mesh: QuadMesh, options: OptimizationOptions | None = None) -> Quad
     """
     options = options or OptimizationOptions()
     old = cut_at_chains(mesh)
-    how = EFFORTS[options.effort]
+    how = CLEAN_UPS[options.effort]
     new = joined(in_batches(old, lambda part: _relaxed(clean_up(_relaxed(part), how)), threads_of(options.threads)))
     better = _is_better(old, new, len(mesh.region_label))
     return stitched_onto(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))

@@ -1,4 +1,4 @@
-"""How far quads are cleaned up; the numbers of each effort of meshing are in `imgquad_core.mesher.efforts`."""
+"""How far quads are cleaned up; numbers of each effort: `mesher.efforts`, of a mesh that is there: `optimization`."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def lower_to_worst(points: Floats, quads: Ints, face: Ints, worst: Floats) -> No
 
 
 @kernel
-def sector_angles(points: Floats, quads: Ints, rim: Flags) -> Floats:
+def rim_angles(points: Floats, quads: Ints, rim: Flags) -> Floats:
     """Sum of the corner angles at each rim node: the angle of its sector; 0 for the others."""
     angle = np.zeros(len(points))
     for q in range(len(quads)):

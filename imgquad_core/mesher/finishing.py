@@ -18,10 +18,10 @@ from imgquad_core.cleanup.relaxation import BAD, GOOD, Rings, fit_rim, laplace, 
 from imgquad_core.cleanup.strips import LEFT_ALONE, in_pieces, independent_nodes, nodes_around, strips_of
 from imgquad_core.cleanup.worst_quads import repair
 from imgquad_core.geometry.halfedge import twins_of
-from imgquad_core.geometry.quad_shape import nodes_of_poor, sector_angles
+from imgquad_core.geometry.quad_shape import nodes_of_poor, rim_angles
 from imgquad_core.threads import in_threads
 
-from .splitting import points_between, split_quads
+from .splitting import points_between, refine_quads
 from .triangulation import Constraints
 
 FIT_ROUNDS = 6  # in which the rim goes to its places, each as far as no quad folds
@@ -82,7 +82,7 @@ def _finished_in_pieces(part: FaceQuads, task: Task) -> FaceQuads:
 def _split(part: FaceQuads, task: Task) -> FaceQuads:
     """Split every quad into four or nine."""
     twins = twins_of(part.quads, len(part.points))
-    return split_quads(part, twins, points_between(part.quads, twins, part.origin, task.rim, task.across))
+    return refine_quads(part, twins, points_between(part.quads, twins, part.origin, task.rim, task.across))
 
 
 def _cleaned_in_pieces(face: FaceQuads, task: Task) -> FaceQuads:
@@ -115,7 +115,7 @@ def _fitted(part: FaceQuads, targets: Floats, whole: bool) -> FaceQuads:
     late = fit_rim(points, rings_of(part.quads, len(points)), rim, targets[part.origin], FIT_ROUNDS)
     if whole:
         points[late] = targets[part.origin[late]]
-    wanted = np.where(rim, wanted_quads(sector_angles(points, part.quads, rim)), INNER_VALENCE)
+    wanted = np.where(rim, wanted_quads(rim_angles(points, part.quads, rim)), INNER_VALENCE)
     return part._replace(points=points, wanted=wanted)
 
 

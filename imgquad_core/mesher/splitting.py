@@ -98,7 +98,7 @@ def _split_composed(
     return new_points[:count].copy(), quads[:n_quads].copy(), owner[:n_quads].copy(), origin[:count].copy(), mid
 
 
-def split_quads(mesh: FaceQuads, twins: Ints, between: Ints) -> FaceQuads:
+def refine_quads(mesh: FaceQuads, twins: Ints, between: Ints) -> FaceQuads:
     """Split every quad into n x n.
 
     Parameters
@@ -110,7 +110,7 @@ def split_quads(mesh: FaceQuads, twins: Ints, between: Ints) -> FaceQuads:
     between : int64, shape (4 n_quads, n - 1)
         Ids in the boundary graph of the points that lie on the way along each rim half-edge.
     """
-    points, quads, origin = _split_quads(mesh.points, mesh.quads, twins, between)
+    points, quads, origin = _refine_quads(mesh.points, mesh.quads, twins, between)
     n = len(mesh.points)
     origin[:n] = mesh.origin
     wanted = np.full(len(points), INNER_VALENCE, np.int64)
@@ -120,7 +120,7 @@ def split_quads(mesh: FaceQuads, twins: Ints, between: Ints) -> FaceQuads:
 
 
 @kernel
-def _split_quads(points: Floats, quads: Ints, twins: Ints, between: Ints) -> tuple[Floats, Ints, Ints]:
+def _refine_quads(points: Floats, quads: Ints, twins: Ints, between: Ints) -> tuple[Floats, Ints, Ints]:
     """Return points, quads (n x n for each one, row by row) and origin of the new points.
 
     d--.--.--c

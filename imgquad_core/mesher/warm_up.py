@@ -17,13 +17,13 @@ def compile_last_stages() -> None:
     from imgquad_core.cleanup.relaxation import BAD, GOOD, fit_rim, laplace, newton, part, rings_of, untangle
     from imgquad_core.cleanup.sliding import slide
     from imgquad_core.cleanup.worst_quads import repair
-    from imgquad_core.geometry.quad_shape import lower_to_worst, sector_angles
+    from imgquad_core.geometry.quad_shape import lower_to_worst, rim_angles
 
-    from .splitting import split_quads
+    from .splitting import refine_quads
 
     points, ids = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.arange(4)
     mesh = FaceQuads(points, ids[None, :].copy(), np.zeros(1, np.int64), ids, np.ones(4, np.int64))
-    split_quads(mesh, np.full(4, -1), np.full((4, 1), -1))
+    refine_quads(mesh, np.full(4, -1), np.full((4, 1), -1))
     clean_up(mesh, CleanUp((1,), 0.0, 0.0))
     repair(mesh, 2.0)
     rings, none = rings_of(mesh.quads, 4), np.zeros(4, bool)
@@ -36,7 +36,7 @@ def compile_last_stages() -> None:
     laplace(points, rings, none, 1)
     untangle(points, rings, none, 1, BAD)
     part(points, rings, none, 0.1, 0.5)
-    sector_angles(points, mesh.quads, none)
+    rim_angles(points, mesh.quads, none)
     lower_to_worst(points, mesh.quads, mesh.face, np.ones(1))
 
 

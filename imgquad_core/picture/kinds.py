@@ -94,17 +94,15 @@ def kind_of(picture: Picture, void: Flags | None = None) -> Kind:
     lonely = counts[3] / max(counts[2], 1)
     nu = lonely / core if core > 0 else np.inf
     figures = f"{lonely:.1%} of its active pixels are lonely, {core:.1%} inside of one value"
-    is_labels = core >= CORE and nu <= LONELY
-    if is_labels or DOUBTFUL < nu <= 2 * LONELY:
-        doubt = f"{figures}: neither clearly labels nor clearly raw" if DOUBTFUL < nu <= 2 * LONELY else None
-        if is_labels:
-            return Kind(True, figures, doubt)
+    doubt = f"{figures}: neither clearly labels nor clearly raw" if DOUBTFUL < nu <= 2 * LONELY else None
+    if core >= CORE and nu <= LONELY:
+        return Kind(True, figures, doubt)
     if n is not None and few is not None and (order := _order(picture, few, void)) >= ORDER:
         return Kind(True, f"{n} values, and neighbours differ like any two pixels ({order:.2f})")
     values = picture.values
     if values.dtype.kind in "iu" and values.ndim == 2 and values.dtype.itemsize >= 4 and nu <= 1:
         return Kind(True, f"{values.dtype}, {figures}", f"{figures}: the type decided")
-    return Kind(False, figures, doubt if DOUBTFUL < nu <= 2 * LONELY else None)
+    return Kind(False, figures, doubt)
 
 
 def _occurring(few: Numbered, void: Flags | None) -> int:

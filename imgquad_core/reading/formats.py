@@ -13,7 +13,7 @@ from imgquad_core.errors import InputError
 from .decoding import NoSuchPicture
 from .dicom import MAGIC as DICM
 from .dicom import PREAMBLE, read_dicom
-from .ebsd_maps import read_ang, read_ctf
+from .ebsd_texts import read_ang, read_ctf
 from .hdf5_files import read_hdf5
 from .info_bar import cut_info_bar
 from .leica import read_lif

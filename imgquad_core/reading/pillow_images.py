@@ -19,7 +19,7 @@ from .calibration import Calibration, in_handy_unit, size_of
 from .decoding import Stack, assert_pixels, decoding, missing_extra, upright
 from .options import ReadOptions
 from .picture import Picture, picture_of
-from .pixel_size import TELLING
+from .tiff_pixel_size import TELLING
 
 #: Pillow's names of what it is let to read
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "DIB", "PPM", "GIF", "WEBP")

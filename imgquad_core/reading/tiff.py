@@ -22,7 +22,7 @@ from .options import ReadOptions
 from .packed import assert_tile
 from .picture import Picture, either, picture_of
 from .pillow_images import read_by_pillow
-from .pixel_size import tiff_pixel_size
+from .tiff_pixel_size import tiff_pixel_size
 
 #: how the file starts, classic and BigTIFF
 MAGIC = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")

@@ -17,7 +17,13 @@ import scipy
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
 from imgquad_core.cleanup.irregular_nodes import clean_up
-from imgquad_core.cleanup.optimization import cut_at_chains, stitched_onto
+from imgquad_core.cleanup.optimization import (
+    GOOD_ENOUGH,
+    LAPLACE_SWEEPS,
+    NEWTON_SWEEPS,
+    cut_at_chains,
+    stitched_onto,
+)
 from imgquad_core.cleanup.options import CleanUp
 from imgquad_core.cleanup.relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
 from imgquad_core.cleanup.strips import nodes_around
@@ -31,7 +37,6 @@ from .meshes import Patch, TileMesh, joined_meshes
 
 SEEDS = 8  #: quads from the seam within which irregular nodes are looked at
 PASSES = (CleanUp((40, 160, 600), 0.5, 0.6), CleanUp((16, 40, 80, 160), 0.5, 0.6))
-GOOD_ENOUGH = 0.5  #: scaled Jacobian down to which the worst quad of a face may fall for fewer irregular nodes
 ROUNDS = ("down", "across", "corner")
 
 
@@ -171,9 +176,9 @@ def _seeds(faces: FaceQuads, points: Floats, near: Flags) -> Flags:
 def _relaxed(part: FaceQuads) -> FaceQuads:
     points, free = part.points.copy(), part.origin < 0
     rings = rings_of(part.quads, len(points))
-    laplace(points, rings, free, 8)
+    laplace(points, rings, free, LAPLACE_SWEEPS)
     untangle(points, rings, free, 2, BAD)
-    newton(points, rings, free, 6, GOOD)
+    newton(points, rings, free, NEWTON_SWEEPS, GOOD)
     untangle(points, rings, free, 4, 0.86)
     return part._replace(points=points)
 

@@ -6,7 +6,7 @@ from .lines import Boundaries, chain_lines, from_lines, to_lines
 from .metaimage import VTK_EXTENSIONS
 from .placement import Placement
 from .quad_grids import quad_grid
-from .vtk_files import read_vtk, silent_vtk
+from .vtk_pictures import read_vtk, silent_vtk
 
 __all__ = [
     "MATERIAL_FIELDS",

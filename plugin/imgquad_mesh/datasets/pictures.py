@@ -20,7 +20,7 @@ from .field_texts import put_texts
 from .fields import put_calibration, put_materials
 from .images import MATERIAL, OPAQUE, PALETTE, PICTURE, VOID_PIXELS
 from .metaimage import VTK_EXTENSIONS
-from .vtk_files import read_vtk
+from .vtk_pictures import read_vtk
 
 
 def read_any(path: str | Path, options: ReadOptions | None = None, name: str | None = None) -> Picture:
@@ -41,7 +41,7 @@ def read(path: str | Path, **options: Any) -> pv.ImageData:
     path : str or Path
         The file.
     **options
-        Fields of `imgquad_core.picture.ReadOptions`: `frame`, `channel`, `level`, `scalars`, `info_bar`,
+        Fields of `imgquad_core.reading.ReadOptions`: `frame`, `channel`, `level`, `scalars`, `info_bar`,
         `grain_angle`, `max_pixels`, `crop`.
 
     Returns

@@ -1,4 +1,4 @@
-"""Between PyVista's datasets and the values of the core."""
+"""Where the pixels of an image lie in space, and where a mesh of them goes."""
 
 from __future__ import annotations
 

@@ -230,7 +230,7 @@ def _triangle_of_face(offsets: Ints, corners: Ints, triangles: NDArray[Any]) -> 
     if _in_pairs(offsets, corners, triangles):
         return 2 * np.arange(len(start)) + ~_have_edge(triangles[::2], start, end)
     n = int(triangles.max()) + 1
-    keys = _edge_keys(triangles, n)
+    keys = _directed_keys(triangles, n)
     order = np.argsort(keys, kind="stable")
     wanted = start * n + end
     at = np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)
@@ -258,13 +258,13 @@ def face_of_triangle(layer: Layer, triangles: NDArray[Any]) -> Ints:
     keys = layer.face_points * n + layer.face_points[after]
     owner = np.repeat(np.arange(layer.n_faces), layer.face_sizes)
     order = np.argsort(keys, kind="stable")
-    wanted = _edge_keys(triangles, n).reshape(-1, 3)
+    wanted = _directed_keys(triangles, n).reshape(-1, 3)
     at = np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)
     found = keys[order][at] == wanted
     return np.asarray(owner[order[at[np.arange(len(triangles)), np.argmax(found, axis=1)]]])
 
 
-def _edge_keys(triangles: NDArray[Any], n_points: int) -> Ints:
+def _directed_keys(triangles: NDArray[Any], n_points: int) -> Ints:
     """Return a number for each directed edge, three a triangle in order."""
     wide = triangles.astype(np.int64)
     return (wide * n_points + np.roll(wide, -1, axis=1)).ravel()

@@ -13,7 +13,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.measures.quality import quad_areas
 from imgquad_core.model import BoundaryGraph, LabelImage, QuadMesh
 from imgquad_core.pipeline import Run
-from imgquad_core.reading.formats import ReadOptions
+from imgquad_core.reading import ReadOptions
 from imgquad_mesh.datasets.pictures import read_any
 
 from .layer import Layer

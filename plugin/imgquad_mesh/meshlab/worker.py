@@ -10,7 +10,6 @@ import json
 import os
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.whole_files import scratch_folder
+from imgquad_mesh.memory import limit_memory
 
 from .layer import (
     Faces,
@@ -47,7 +47,7 @@ MEMORY = "IMGQUAD_MESHLAB_BYTES"  #: environment variable with the bytes that th
 
 def main() -> None:
     """Answer requests until the input ends."""
-    _limit_memory(int(os.environ.get(MEMORY, "0")))
+    limit_memory(int(os.environ.get(MEMORY, "0")))
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what pymeshlab prints must not get between the answers
     import pymeshlab  # an extra, and prints while it loads
@@ -61,18 +61,6 @@ def main() -> None:
             answer = {"error": f"{type(error).__name__}: {error}"}
         answers.write(json.dumps(answer, default=plain) + "\n")
         answers.flush()
-
-
-def _limit_memory(n_bytes: int) -> None:
-    """Have what needs more fail here, before the machine swaps or ends other processes."""
-    try:
-        import resource  # there is none on Windows
-    except ImportError:
-        return
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    if n_bytes and (hard == resource.RLIM_INFINITY or n_bytes < hard):
-        with suppress(ValueError, OSError):  # macOS refuses some
-            resource.setrlimit(resource.RLIMIT_AS, (n_bytes, hard))
 
 
 def plain(value: Any) -> Any:

@@ -35,6 +35,7 @@ from imgquad_core.reading import Picture, ReadOptions, read_picture
 from imgquad_core.reading.formats import OF_VTK
 from imgquad_core.writers.neighbours import files_of
 from imgquad_mesh import outputs
+from imgquad_mesh.memory import limit_memory
 
 from . import packing
 from .recipe import PROPERTIES, Recipe, recipe_of
@@ -104,7 +105,7 @@ def _assert_whole(path: Path, name: str) -> None:
 
 def work(pipe: Connection, folder: str, pixels: int, memory: int) -> None:
     """Answer tasks until the pipe is closed."""
-    _limit_memory(memory)
+    limit_memory(memory, "RLIMIT_DATA")
     desk = Desk(Path(folder), pixels)
     while True:
         try:
@@ -306,12 +307,3 @@ TASKS: Mapping[str, Callable[[Desk, Mapping[str, Any], Tell], Answer]] = {
     "look": _look,
     "rock": _rock,
 }
-
-
-def _limit_memory(bytes_: int) -> None:
-    """Let the process have so much data, so that too large a picture is a `MemoryError` and not the machine's end."""
-    try:
-        import resource  # there is none on Windows
-    except ImportError:
-        return
-    resource.setrlimit(resource.RLIMIT_DATA, (bytes_, bytes_))

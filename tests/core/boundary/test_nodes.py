@@ -11,9 +11,9 @@ from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.nodes import (
     Placement,
     even_out,
-    level_of,
     mark_sharp,
     number_nodes,
+    on_stride,
     place_nodes,
     points_at,
 )
@@ -110,7 +110,7 @@ def test_ids_of_nodes_are_shared_at_the_ends_and_the_coarse_level_has_every_seco
     assert np.array_equal(nodes.points[nodes.chain_points], points_at(curves.raw, placed.at))
     assert np.array_equal(nodes.points[: len(ends.place)], ends.place)
     for step in (1, 2):
-        level = level_of(nodes, step)
+        level = on_stride(nodes, step)
         pairs = [
             (nodes.chain_points[a:b:step][k], nodes.chain_points[a:b:step][k + 1], c)
             for c, (a, b) in enumerate(zip(placed.offsets, placed.offsets[1:], strict=False))

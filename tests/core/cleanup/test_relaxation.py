@@ -22,7 +22,7 @@ from imgquad_core.cleanup.relaxation import (
     rings_of,
     untangle,
 )
-from imgquad_core.geometry.quad_shape import lower_to_worst, quad_area, quad_quality, sector_angles
+from imgquad_core.geometry.quad_shape import lower_to_worst, quad_area, quad_quality, rim_angles
 from imgquad_core.measures.quality import scaled_jacobian
 from support import naive
 from support.faces import Points, grid, quads_of, voronoi_graph
@@ -242,5 +242,5 @@ def test_measures_agree_with_their_definitions(seed: int) -> None:
 
 def test_sector_angles_of_a_valid_mesh() -> None:
     mesh = rough(4)
-    angle = np.degrees(sector_angles(mesh.points, mesh.quads, mesh.origin >= 0))
+    angle = np.degrees(rim_angles(mesh.points, mesh.quads, mesh.origin >= 0))
     assert np.allclose(angle, np.where(mesh.origin >= 0, 90 * mesh.wanted, 0))

@@ -11,7 +11,7 @@ from imgquad_core.cleanup.faces import FaceQuads
 from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.mesher.composing import compose
 from imgquad_core.mesher.outline import coarse_segments
-from imgquad_core.mesher.splitting import points_between, split_composed, split_quads
+from imgquad_core.mesher.splitting import points_between, refine_quads, split_composed
 from imgquad_core.mesher.triangulation import constraint_table
 from imgquad_core.model import BoundaryGraph
 from support import naive
@@ -84,7 +84,7 @@ def in_parts(mesh: FaceQuads, n: int) -> FaceQuads:
     """Split with ids 1000 + 10 h + i for the points on the way along each rim half-edge h."""
     twins = twins_of(mesh.quads, len(mesh.points))
     ids = 1000 + 10 * np.arange(twins.size)[:, None] + np.arange(n - 1)
-    return split_quads(mesh, twins, np.where(twins[:, None] < 0, ids, -1))
+    return refine_quads(mesh, twins, np.where(twins[:, None] < 0, ids, -1))
 
 
 @pytest.mark.parametrize("n", [2, 3])
@@ -142,4 +142,4 @@ def test_points_on_the_way_are_looked_up_in_the_graph(n: int) -> None:
     twins = twins_of(coarse.quads, len(coarse.points))
     between = points_between(coarse.quads, twins, coarse.origin, table, n)
     assert np.array_equal(between >= 0, np.repeat(twins[:, None] < 0, n - 1, axis=1))
-    assert_valid_faces(split_quads(coarse, twins, between), graph)
+    assert_valid_faces(refine_quads(coarse, twins, between), graph)

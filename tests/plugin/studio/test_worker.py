@@ -78,7 +78,7 @@ def test_marks_that_are_missing_are_asked_for(folder: Path) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of memory on Windows")
 def test_memory_beyond_the_limit_is_a_memory_error_of_the_worker() -> None:
     code = (
-        "from imgquad_mesh.studio.worker import _limit_memory\nimport numpy as np\n_limit_memory(10**9)\n"
+        "from imgquad_mesh.memory import limit_memory\nimport numpy as np\nlimit_memory(10**9, 'RLIMIT_DATA')\n"
         "try: np.ones(300_000_000)\nexcept MemoryError: print('refused')"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
