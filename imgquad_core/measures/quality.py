@@ -92,9 +92,8 @@ def quality_report(mesh: QuadMesh) -> QualityReport:
     -------
     QualityReport
     """
-    sj = scaled_jacobian(mesh.points, mesh.quads)
-    angles = corner_angles(mesh.points, mesh.quads)
-    ratio = aspect(mesh.points, mesh.quads)
+    corners = _corners(mesh.points, mesh.quads)
+    sj, angles, ratio = _least_sines(corners), _angles(corners), _aspects(corners)
     inner = inner_nodes(mesh)
     low, high = GOOD_ANGLES
     return QualityReport(
@@ -107,7 +106,7 @@ def quality_report(mesh: QuadMesh) -> QualityReport:
         inverted=int(np.count_nonzero(sj <= 0.0)),
         min_angle=float(angles.min()),
         max_angle=float(angles.max()),
-        good_angles=float(((angles >= low) & (angles <= high)).all(axis=1).mean()),
+        good_angles=float(((angles >= low) & (angles <= high)).all(axis=0).mean()),
         inner_nodes=int(np.count_nonzero(inner)),
         irregular=float(np.mean(mesh.valence[inner] != 4)) if inner.any() else 0.0,
         max_valence=int(mesh.valence.max()),
@@ -118,24 +117,17 @@ def quality_report(mesh: QuadMesh) -> QualityReport:
 
 def scaled_jacobian(points: Floats, quads: Ints) -> Floats:
     """Return the least sine of each quad's corner angles, shape (n_quads,); 0 where an edge has no length."""
-    cross, _, lengths = _corners(points, quads)
-    product = lengths * np.roll(lengths, 1, axis=0)
-    return np.asarray(np.divide(cross, product, out=np.zeros_like(cross), where=product > 0.0).min(axis=0))
+    return _least_sines(_corners(points, quads))
 
 
 def corner_angles(points: Floats, quads: Ints) -> Floats:
     """Return the angle inside each corner, in degrees from 0 to 360, shape (n_quads, 4)."""
-    cross, dot, _ = _corners(points, quads)
-    angles = np.degrees(np.arctan2(cross, dot))
-    angles[angles < 0.0] += 360.0
-    return np.ascontiguousarray(angles.T)
+    return np.ascontiguousarray(_angles(_corners(points, quads)).T)
 
 
 def aspect(points: Floats, quads: Ints) -> Floats:
     """Return longest by shortest edge of each quad, shape (n_quads,); infinite where an edge has no length."""
-    _, _, lengths = _corners(points, quads)
-    with np.errstate(divide="ignore"):
-        return np.asarray(lengths.max(axis=0) / lengths.min(axis=0))
+    return _aspects(_corners(points, quads))
 
 
 def quad_areas(points: Floats, quads: Ints) -> Floats:
@@ -248,16 +240,37 @@ def _told(mesh: QuadMesh, place: BadPlace) -> str:
     return f"{place.scaled_jacobian:.3f} at ({place.x:.6g}, {place.y:.6g}) in {names}{angle}"
 
 
-def _corners(points: Floats, quads: Ints) -> tuple[Floats, Floats, Floats]:
-    """Return cross and dot product of the two edges at each corner, and the length of the edge that leaves it.
+class _Corners(NamedTuple):
+    """Of all quads, shape (4, n_quads): NumPy reduces few long rows many times faster than many short ones."""
 
-    Each has shape (4, n_quads): NumPy reduces few long rows many times faster than many short ones.
-    """
+    cross: Floats  # product of the two edges at each corner
+    dot: Floats
+    lengths: Floats  # of the edge that leaves it
+
+
+def _least_sines(corners: _Corners) -> Floats:
+    product = corners.lengths * np.roll(corners.lengths, 1, axis=0)
+    sines = np.divide(corners.cross, product, out=np.zeros_like(product), where=product > 0.0)
+    return np.asarray(sines.min(axis=0))
+
+
+def _angles(corners: _Corners) -> Floats:
+    angles = np.degrees(np.arctan2(corners.cross, corners.dot))
+    angles[angles < 0.0] += 360.0
+    return np.asarray(angles)
+
+
+def _aspects(corners: _Corners) -> Floats:
+    with np.errstate(divide="ignore"):
+        return np.asarray(corners.lengths.max(axis=0) / corners.lengths.min(axis=0))
+
+
+def _corners(points: Floats, quads: Ints) -> _Corners:
     x, y = (np.ascontiguousarray(points[:, k])[quads.T] for k in (0, 1))
     along, up = np.roll(x, -1, axis=0) - x, np.roll(y, -1, axis=0) - y
     back, down = -np.roll(along, 1, axis=0), -np.roll(up, 1, axis=0)
     dot = along * back + up * down + 0.0  # no -0, whose angle would be 180 degrees
-    return along * down - up * back, dot, np.hypot(along, up)
+    return _Corners(along * down - up * back, dot, np.hypot(along, up))
 
 
 def _on_constraint(mesh: QuadMesh) -> Flags:
