@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple, TypeAlias, TypeVar
@@ -58,8 +59,9 @@ from .reading import Calibration, Picture, ReadOptions, picture_of, read_picture
 
 Source: TypeAlias = "str | Path | NDArray[Any] | LabelImage | Picture"
 T = TypeVar("T")
-#: called with the name of the stage that starts, its number from 0, and the number of stages
-Progress: TypeAlias = Callable[[str, int, int], None]
+#: called with the name of the stage that starts, its number from 0, and the number of stages; later with fractions
+#: of numbers, as parts of a long stage are done
+Progress: TypeAlias = Callable[[str, float, int], None]
 STAGES = ("read", "segment", "denoise", "absorb", "boundary", "smooth", "mesh")
 MOST_QUADS = 200_000_000  #: more are refused before memory is
 _MATCHES = 8  # rounds in which opposite sides of a periodic cell are cut alike
@@ -195,7 +197,7 @@ def run(
     options : MeshOptions, optional
         As for `mesh_image`.
     progress : callable, optional
-        Called as each stage starts.
+        Called as each stage starts, and as parts of the mesh are there.
     memory : Memory, optional
         Of former runs, whose values are taken where they are the same.
     """
@@ -219,7 +221,8 @@ def run(
     with timed("smooth"):
         boundary = made("boundary", smooth, staircase, smoothing, true, options.periodic)
     with timed("mesh"):
-        boundary, mesh = made("mesh", fill_boundaries, boundary, meshing, labels.materials, options.periodic)
+        fill = partial(fill_boundaries, told=timed.within("mesh"))
+        boundary, mesh = made("mesh", fill, boundary, meshing, labels.materials, options.periodic)
     return Run(
         options=options,
         segmentation=found,
@@ -321,10 +324,14 @@ def smooth(
 
 
 def fill_boundaries(
-    boundary: BoundaryGraph, options: MeshingOptions, materials: Materials, periodic: str = "none"
+    boundary: BoundaryGraph,
+    options: MeshingOptions,
+    materials: Materials,
+    periodic: str = "none",
+    told: Callable[[float], None] | None = None,
 ) -> tuple[BoundaryGraph, QuadMesh]:
     """Mesh; where the mesher has cut edges of one side of a periodic cell only, cut the other, too, and mesh anew."""
-    mesh = _meshed(boundary, options, materials)
+    mesh = _meshed(boundary, options, materials, told)
     for attempt in range(_MATCHES if periodic != "none" else 0):
         again = rematch(boundary, mesh, periodic)
         if again is None:
@@ -335,9 +342,14 @@ def fill_boundaries(
     return boundary, mesh
 
 
-def _meshed(boundary: BoundaryGraph, options: MeshingOptions, materials: Materials) -> QuadMesh:
+def _meshed(
+    boundary: BoundaryGraph,
+    options: MeshingOptions,
+    materials: Materials,
+    told: Callable[[float], None] | None = None,
+) -> QuadMesh:
     turn = turn_of_graph(boundary)
-    return turn.mesh_back(mesh_boundaries(turn.graph(boundary), options, materials), boundary.shape)
+    return turn.mesh_back(mesh_boundaries(turn.graph(boundary), options, materials, told), boundary.shape)
 
 
 class _Stopwatch:
@@ -354,6 +366,13 @@ class _Stopwatch:
         start = perf_counter()
         yield
         self.seconds[stage] = perf_counter() - start
+
+    def within(self, stage: str) -> Callable[[float], None] | None:
+        """Return what tells the share of a stage that is done."""
+        if self._progress is None:
+            return None
+        progress, number = self._progress, STAGES.index(stage)
+        return lambda share: progress(stage, number + share, len(STAGES))
 
 
 class _Begun(NamedTuple):

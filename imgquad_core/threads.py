@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
@@ -34,12 +34,26 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_threads(parts: list[Part], work: Callable[[Part], Result], threads: int) -> list[Result]:
-    """Call `work` for each part; the results come in the order of the parts, whatever the threads."""
+def in_threads(
+    parts: list[Part], work: Callable[[Part], Result], threads: int, told: Callable[[Part], None] | None = None
+) -> list[Result]:
+    """Call `work` for each part; the results come in the order of the parts, whatever the threads.
+
+    In that order, too, and in the thread of the caller, `told` is called with each part that is done.
+    """
     if threads == 1 or len(parts) == 1:
-        return [work(part) for part in parts]
+        return _collected(parts, map(work, parts), told)
     with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(work, parts))
+        return _collected(parts, pool.map(work, parts), told)
+
+
+def _collected(parts: list[Part], results: Iterator[Result], told: Callable[[Part], None] | None) -> list[Result]:
+    found = []
+    for part, result in zip(parts, results, strict=True):
+        found.append(result)
+        if told is not None:
+            told(part)
+    return found
 
 
 def even_parts(points: Ints, threads: int, least: int = LEAST) -> list[slice]:

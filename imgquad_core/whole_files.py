@@ -122,8 +122,8 @@ def _remove(folder: Path) -> None:
 
 
 @atexit.register
-def _remove_all() -> None:
-    """Remove what an interrupt has left, but not what the process has that this one was forked from."""
+def remove_scratch() -> None:
+    """Remove what an interrupt has left of this process, but not what the process has that it was forked from."""
     for folder, process in list(_OPEN.items()):
         if process == os.getpid():
             _remove(folder)

@@ -5,6 +5,7 @@ Faces share no point, so threads can work on them in batches; large ones are wor
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -57,11 +58,12 @@ class Task(NamedTuple):
         return FULL if self.across == 1 else AGAIN
 
 
-def finished(batches: list[FaceQuads], task: Task) -> list[FaceQuads]:
-    """Turn composed quads, from `batches_of`, into the final ones of their faces, batch by batch."""
+def finished(batches: list[FaceQuads], task: Task, told: Callable[[FaceQuads], None] | None = None) -> list[FaceQuads]:
+    """Turn composed quads, from `batches_of`, into the final ones of their faces; `told` of each batch that is done."""
     small = [part for part in batches if not is_large(part, task.portions)]
-    whole = in_threads(small, lambda part: _without_poor(_finished_whole(part, task)), task.threads)
-    single = [_finished_in_pieces(part, task) for part in batches if is_large(part, task.portions)]
+    whole = in_threads(small, lambda part: _without_poor(_finished_whole(part, task)), task.threads, told)
+    large = [part for part in batches if is_large(part, task.portions)]
+    single = in_threads(large, lambda part: _finished_in_pieces(part, task), 1, told)
     return [*whole, *in_threads(single, _without_poor, task.threads)]
 
 

@@ -29,6 +29,7 @@ from imgquad_core.threads import in_threads
 from .efforts import EFFORTS
 from .options import MeshingOptions
 from .outline import with_short_chains_halved
+from .progress import Progress
 from .refits import State, with_musts, with_wishes
 from .strides import LEAST_WIDTH, consistent, mesh_faces
 
@@ -39,7 +40,10 @@ FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60
 
 @ahead.compiling
 def mesh_boundaries(
-    graph: BoundaryGraph, options: MeshingOptions | None = None, materials: Materials | None = None
+    graph: BoundaryGraph,
+    options: MeshingOptions | None = None,
+    materials: Materials | None = None,
+    told: Callable[[float], None] | None = None,
 ) -> QuadMesh:
     """Fill the regions between boundaries with quadrilaterals.
 
@@ -51,6 +55,8 @@ def mesh_boundaries(
         Sizes, effort, threads.
     materials : Materials, optional
         Carried to the mesh; by default made of the labels.
+    told : callable, optional
+        Called again and again with the share of the quads, 0 to 1, that are made.
 
     Returns
     -------
@@ -68,7 +74,8 @@ def mesh_boundaries(
         raise TopologyError(f"chain {odd[0]} has {edges_of_chains(graph)[odd[0]]} edges: give each an even number")
     graph = consistent(graph, np.ones(graph.n_chains, bool), options.triangulator)
     graph = with_short_chains_halved(graph, LEAST_WIDTH)
-    state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options))
+    progress = Progress(graph.region_pixels / options.face_sizes(graph.region_label) ** 2, told) if told else None
+    state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options, progress))
     state = with_musts(with_wishes(state, options), options)
     mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
     return _slid(mesh, EFFORTS[options.effort].slides, options.n_threads, options.tuning.portions)

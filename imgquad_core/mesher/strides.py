@@ -28,6 +28,7 @@ from .finishing import Task, finished
 from .frontal import frontal_points
 from .options import MeshingOptions
 from .outline import Outline, chains_in_conflict, chains_of, coarse_segments, mean_edges, outline, wide_faces
+from .progress import Progress
 from .splitting import split_composed
 from .triangulation import Triangles, constraint_table, triangulate
 from .warm_up import compile_last_stages
@@ -79,18 +80,18 @@ def consistent(graph: BoundaryGraph, new: Flags, triangulator: str) -> BoundaryG
     raise TopologyError("the boundaries of the regions cross or contradict each other")
 
 
-def mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions) -> Meshed:
+def mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions, progress: Progress | None = None) -> Meshed:
     """Mesh flagged faces, each on its stride."""
     effort = EFFORTS[options.effort]
     best = Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -np.inf))
     rim = mean_edges(graph) / options.face_sizes(graph.region_label)
     if effort.in_nine:
         wide = todo & wide_faces(graph, 6, options.tuning.very_wide) & (rim > EVEN[6])
-        best = _better(best, _mesh_wide(graph, wide, 6, effort.wide, options))
+        best = _better(best, _mesh_wide(graph, wide, 6, effort.wide, options, progress))
     wide = todo & wide_faces(graph, 4, LEAST_WIDTH) & (rim >= EVEN[4]) & (best.worst < ENOUGH)
-    best = _better(best, _mesh_wide(graph, wide, 4, effort.wide, options))
+    best = _better(best, _mesh_wide(graph, wide, 4, effort.wide, options, progress))
     enough = np.where(_large_faces(best), min(options.tuning.worst, effort.again_below), effort.again_below)
-    return _better(best, _mesh_at_stride(graph, todo & (best.worst < enough), 2, effort.narrow, options))
+    return _better(best, _mesh_at_stride(graph, todo & (best.worst < enough), 2, effort.narrow, options, progress))
 
 
 def _better(one: Meshed, other: Meshed) -> Meshed:
@@ -106,17 +107,21 @@ def _large_faces(meshed: Meshed) -> Flags:
     return np.asarray(np.bincount(np.concatenate(faces), minlength=len(meshed.faces)) > LARGE)
 
 
-def _mesh_wide(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> Meshed:
+def _mesh_wide(
+    graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions, progress: Progress | None
+) -> Meshed:
     """Mesh faces coarsely, without those whose chords contradict each other."""
     while True:
         try:
-            return _mesh_at_stride(graph, faces, stride, how, options)
+            return _mesh_at_stride(graph, faces, stride, how, options, progress)
         except _Conflict as conflict:
             faces = faces.copy()
             faces[conflict.regions] = False
 
 
-def _mesh_at_stride(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions) -> Meshed:
+def _mesh_at_stride(
+    graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions, progress: Progress | None
+) -> Meshed:
     """Mesh the flagged faces from segments of `stride` edges."""
     worst = np.ones(len(faces))
     if not faces.any():
@@ -125,7 +130,10 @@ def _mesh_at_stride(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanU
     groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
     ahead.wait()
     composed = in_threads(
-        groups, lambda group: batches_of(composed_quads(graph, group, stride, options), portions), options.n_threads
+        groups,
+        lambda group: batches_of(composed_quads(graph, group, stride, options), portions),
+        options.n_threads,
+        progress.composed if progress else None,
     )
     if options.n_threads > 1:
         compile_last_stages()  # loaded by threads, in turn and one in the other's way, machine code takes twice as long
@@ -133,7 +141,8 @@ def _mesh_at_stride(graph: BoundaryGraph, faces: Flags, stride: int, how: CleanU
     nothing = np.zeros(len(rim.tail), np.int64)
     table = constraint_table(len(graph.points), rim.tail, rim.head, nothing, nothing, rim.middle)
     batches = [batch for group in composed for batch in group]
-    parts = finished(batches, Task(graph.points, stride // 2, table, how, options.n_threads, portions))
+    task = Task(graph.points, stride // 2, table, how, options.n_threads, portions)
+    parts = finished(batches, task, progress.finished if progress else None)
     in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.n_threads)
     return Meshed(parts, faces, worst)
 

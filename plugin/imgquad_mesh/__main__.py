@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -11,9 +12,10 @@ from io import TextIOWrapper
 from typing import NoReturn
 
 from imgquad_core.errors import ImgquadError, InputError, QualityError
+from imgquad_core.whole_files import remove_scratch
 
 from . import cli
-from .cli.interruption import handling_signals
+from .cli.interruption import handling_signals, is_working
 
 GOOD, BUG, BAD_INPUT, LIMIT_NOT_MET = 0, 1, 2, 3
 BY_SIGNAL = 128  #: plus the number of the signal, as shells have it
@@ -58,7 +60,12 @@ def main(argv: Sequence[str] | None = None) -> int:
                 return _failed(*_told(error))
         except KeyboardInterrupt:
             pass
-    return _failed("interrupted", BY_SIGNAL + (interruption.signal or signal.SIGINT))
+    code = _failed("interrupted", BY_SIGNAL + (interruption.signal or signal.SIGINT))
+    if is_working():  # Python would wait for it
+        remove_scratch()
+        sys.stdout.flush()
+        os._exit(code)
+    return code
 
 
 def _told(error: Exception) -> tuple[object, int]:

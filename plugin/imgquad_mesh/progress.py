@@ -18,20 +18,26 @@ DOING = {
 
 
 @contextmanager
-def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, int, int], None]]:
+def progress_bar_if(wanted: bool) -> Iterator[Callable[[str, float, int], None]]:
     """Give a function to call as each stage starts; it draws a bar if one is wanted and there is a terminal."""
     from rich.console import Console  # not above: rich takes longer than the whole accessor
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
     if not (wanted and console.is_terminal):
         yield lambda stage, number, total: None
         return
-    columns = (TextColumn("{task.description:22}"), BarColumn(), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description:22}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("starting", total=None)
 
-        def show(stage: str, number: int, total: int) -> None:
+        def show(stage: str, number: float, total: int) -> None:
             progress.update(task, description=DOING[stage], completed=number, total=total)
 
         yield show

@@ -121,7 +121,12 @@ def test_mesh_is_in_the_unit_of_the_pixel_size() -> None:
 def test_run_keeps_all_values_and_times_and_tells_of_progress() -> None:
     told = []
     made = run(disc(), progress=lambda stage, number, total: told.append((stage, number, total)))
-    assert told == [(stage, i, len(STAGES)) for i, stage in enumerate(STAGES)]
+    begun = [(stage, i, len(STAGES)) for i, stage in enumerate(STAGES)]
+    assert told[: len(STAGES)] == begun
+    within = [number for _, number, _ in told[len(STAGES) :]]
+    assert {stage for stage, *_ in told[len(STAGES) :]} == {"mesh"}
+    assert within == sorted(within)
+    assert within[-1] == pytest.approx(len(STAGES))
     assert tuple(made.seconds) == STAGES
     assert len(made.boundary.region_label) == len(made.pixel_boundary.region_label) == 2
 

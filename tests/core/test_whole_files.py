@@ -168,7 +168,7 @@ def test_an_interrupt_at_any_step_leaves_nothing_at_the_end(tmp_path: Path, monk
             patch.setattr(owner, name, broken)
             with pytest.raises(KeyboardInterrupt), scratch_folder(tmp_path):
                 pass
-        whole_files._remove_all()  # as at the end of the process
+        whole_files.remove_scratch()  # as at the end of the process
         assert not left_in(tmp_path)
 
 

@@ -18,7 +18,7 @@ from PIL import Image
 from imgquad_core.errors import InputError
 from imgquad_mesh import outputs, run_script
 from imgquad_mesh.__main__ import main
-from imgquad_mesh.cli.interruption import handling_signals
+from imgquad_mesh.cli.interruption import handling_signals, promptly
 from imgquad_mesh.outputs import files
 
 LABELS = np.zeros((20, 30), np.uint8)
@@ -154,6 +154,48 @@ def test_a_signal_ends_the_command_in_order(folder: Path, number: int) -> None:
     assert (process.returncode, said) == (128 + number, "imgquad-mesh: error: interrupted\n")
     assert (folder / "rock.vtu").read_text() == "old"
     assert not [file for file in folder.iterdir() if file.name.startswith(".imgquad")]
+
+
+BUSY = """
+import sys, threading, time
+import numpy as np
+from imgquad_core.jit import kernel
+from imgquad_mesh import cli
+from imgquad_mesh.__main__ import main
+
+@kernel
+def count(n, out):
+    for k in range(n):
+        out[k % 8] += np.sin(k)
+
+count(10, np.zeros(8))
+
+def work(*_):
+    print("working", flush=True)
+    count(10**11, np.zeros(8))
+
+cli.run.core.run = work
+sys.exit(main(["run", "rock.png", "rock.vtu", "--quiet"]))
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no such signals")
+def test_a_signal_ends_the_command_at_once_whatever_kernel_runs(folder: Path) -> None:
+    (folder / "busy.py").write_text(BUSY)
+    process = subprocess.Popen([sys.executable, "busy.py"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "working\n"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=20)  # the kernel takes many minutes
+    assert (process.returncode, said) == (128 + signal.SIGINT, "imgquad-mesh: error: interrupted\n")
+    assert not [file for file in folder.iterdir() if file.name.startswith(".imgquad")]
+
+
+def test_errors_and_results_come_through_the_thread() -> None:
+    assert promptly(lambda: 7) == 7
+    with pytest.raises(InputError, match="such"):
+        promptly(lambda: (_ for _ in ()).throw(InputError("such")))
 
 
 def test_a_signal_during_an_import_waits_for_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,16 +1,22 @@
-"""Ctrl-C, SIGTERM and SIGHUP end the command in order: what was begun is cleaned up."""
+"""Ctrl-C, SIGTERM and SIGHUP end the command in order, and at once: what was begun is cleaned up."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from time import monotonic
 from types import FrameType
+from typing import TypeVar
+
+T = TypeVar("T")
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name))
 LATER = 0.05  #: seconds after which a signal that came during an import comes again
+WORKER = "imgquad-mesh-work"
+STACK = 64 << 20  #: bytes, as main threads have it; others have half a megabyte on some systems
 AGAIN = 1.0  #: seconds in which further signals do not disturb the cleaning up
 
 
@@ -47,6 +53,34 @@ def handling_signals() -> Iterator[Interruption]:
     finally:
         for number, handler in former.items():
             signal.signal(number, handler)
+
+
+def promptly(work: Callable[[], T]) -> T:
+    """Return what `work` gives, done in a thread of its own: Python hears of no signal while a kernel runs in this one.
+
+    When a signal ends the wait the work goes on, until the process ends: see `is_working`.
+    """
+    outcome: Future[T] = Future()
+    thread = threading.Thread(target=_settle, args=(outcome, work), name=WORKER, daemon=True)
+    usual = threading.stack_size(STACK)
+    thread.start()
+    threading.stack_size(usual)
+    while True:
+        thread.join(LATER)  # Windows interrupts no wait without an end
+        if outcome.done():
+            return outcome.result()
+
+
+def is_working() -> bool:
+    """Whether work of `promptly` goes on that nobody waits for."""
+    return any(thread.name == WORKER for thread in threading.enumerate())
+
+
+def _settle(outcome: Future[T], work: Callable[[], T]) -> None:
+    try:
+        outcome.set_result(work())
+    except BaseException as error:
+        outcome.set_exception(error)
 
 
 def _is_importing(frame: FrameType | None) -> bool:

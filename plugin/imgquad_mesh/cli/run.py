@@ -16,6 +16,7 @@ from imgquad_mesh.progress import progress_bar_if
 from imgquad_mesh.texts import number
 
 from .element_options import add_element_options, element_options, writer_options
+from .interruption import promptly
 from .mesh_options import add_mesh_options, mesh_options
 from .script import print_crosscheck
 
@@ -139,10 +140,10 @@ def mesh_to_files(
     return 0
 
 
-def _run(image: Path, options: core.MeshOptions, progress: Callable[[str, int, int], None]) -> core.Run:
+def _run(image: Path, options: core.MeshOptions, progress: Callable[[str, float, int], None]) -> core.Run:
     is_vtk = image.suffix.lower() in datasets.VTK_EXTENSIONS
     source = datasets.read_vtk(image, options.reading()) if is_vtk else image
-    return core.run(source, options, progress)
+    return promptly(lambda: core.run(source, options, progress))
 
 
 def _write_others(run: core.Run, to: Outputs, report: dict[str, Any]) -> None:

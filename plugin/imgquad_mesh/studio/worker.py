@@ -148,10 +148,10 @@ def _run(desk: Desk, task: Mapping[str, Any], tell: Tell, until: str) -> Run | N
     recipe = _recipe(desk, task)
     early = MeshOptions(**{name: getattr(recipe.options, name) for name in _EARLY})
 
-    def progress(stage: str, number: int, total: int) -> None:
+    def progress(stage: str, number: float, total: int) -> None:
         if stage == "denoise":
             desk.keep(task, early)
-        if number > STAGES.index(until):
+        if number >= STAGES.index(until) + 1:
             raise _Enough
         tell({"stage": stage, "number": number, "of": STAGES.index(until) + 1})
 

@@ -130,7 +130,7 @@ def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypa
     first, last = int(graph.region_label.argmin()), int(graph.region_label.argmax())
     rounds: list[set[int]] = []
 
-    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions) -> strides.Meshed:
+    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions, _: object = None) -> strides.Meshed:
         done = mesh_faces(graph, todo, options)
         worst = np.full(len(todo), 0.95)
         worst[first], worst[last] = (0.95, 0.2) if rounds else (0.3, 0.3)
@@ -427,3 +427,15 @@ def test_island_on_the_wrong_side_of_a_chord_is_kept_on_its_own() -> None:
 def test_bad_options_are_named_with_their_value_and_the_remedy(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         MeshingOptions(**options)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_the_share_that_is_done_rises_to_one(threads: int) -> None:
+    graph = boundaries(label_image(voronoi(120, 120, 30, 5)), 2.0)
+    told: list[float] = []
+    mesh_boundaries(
+        graph, MeshingOptions(size=2.0, threads=threads, tuning=Tuning(portions=Portions(60, 200))), None, told.append
+    )
+    assert len(told) > 10
+    assert (np.diff(told) > 0).all()
+    assert told[-1] == pytest.approx(1.0)
