@@ -151,7 +151,7 @@ def _run(desk: Desk, task: Mapping[str, Any], tell: Tell, until: str) -> Run | N
     def progress(stage: str, number: float, total: int) -> None:
         if stage == "denoise":
             desk.keep(task, early)
-        if number >= STAGES.index(until) + 1:
+        if STAGES.index(stage) > STAGES.index(until):
             raise _Enough
         tell({"stage": stage, "number": number, "of": STAGES.index(until) + 1})
 
