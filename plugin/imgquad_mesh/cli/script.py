@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import imgquad_core as core
 from imgquad_mesh import meshlab, outputs
 from imgquad_mesh.texts import number
+
+from .interruption import promptly
 
 #: endings of inputs that are meshes; all others are pictures
 MESHES = (
@@ -54,7 +57,8 @@ def execute(args: argparse.Namespace) -> int:
         outputs.check_target(args.report, (".json",))
         outputs.check_files([args.script, args.input], [args.output, args.report])
     is_mesh = args.input is not None and args.input.suffix.lower() in MESHES
-    result = meshlab.script.run_script(
+    run = partial(
+        meshlab.script.run_script,
         args.script,
         image=None if is_mesh else args.input,
         mesh=args.input if is_mesh else None,
@@ -64,6 +68,7 @@ def execute(args: argparse.Namespace) -> int:
         memory=args.memory,
         progress=None if args.quiet or not sys.stderr.isatty() else _announce,
     )
+    result = promptly(run)
     if args.report:
         outputs.write_json(report_of(result), args.report)
     if not args.quiet:
