@@ -50,7 +50,7 @@ def build_report(
         "region_errors": asdict(region_errors(run.boundary)),
         "quality": asdict(quality_report(run.mesh)) | _low_quads(run, LOW if min_quality is None else min_quality),
         "seconds": {name: round(value, 4) for name, value in seconds.items()},
-        "peak_memory_mb": peak_memory_mb(),
+        **_memory(rows * cols, run.mesh.n_quads),
         "versions": versions(),
     }
 
@@ -110,6 +110,13 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version(), "platform": platform.platform()} | {
         package: found for package in PACKAGES if (found := _version(package))
     }
+
+
+def _memory(pixels: int, quads: int) -> dict[str, float | None]:
+    """Return the largest amount of memory, in MB, and in bytes a pixel and a quad (packages included)."""
+    peak = peak_memory_mb()
+    per_pixel, per_quad = (None if peak is None else round(1e6 * peak / n, 1) for n in (pixels, quads))
+    return {"peak_memory_mb": peak, "peak_bytes_per_pixel": per_pixel, "peak_bytes_per_quad": per_quad}
 
 
 def peak_memory_mb() -> float | None:

@@ -62,6 +62,9 @@ def test_run_writes_all_that_is_asked_for(disc: Path, tmp_path: Path, capsys: py
     assert told["options"]["size"] == 3
     assert told["versions"]["numpy"] == np.__version__
     assert told["peak_memory_mb"] > 10
+    pixels, quads = told["rows"] * told["columns"], told["quality"]["n_quads"]
+    assert told["peak_bytes_per_pixel"] * pixels == pytest.approx(1e6 * told["peak_memory_mb"], rel=1e-3)
+    assert told["peak_bytes_per_quad"] * quads == pytest.approx(1e6 * told["peak_memory_mb"], rel=1e-3)
 
     printed = capsys.readouterr()
     assert f"{told['quality']['n_quads']} quads" in printed.out
