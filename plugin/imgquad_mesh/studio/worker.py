@@ -35,7 +35,7 @@ from imgquad_core.reading import Picture, ReadOptions, read_picture
 from imgquad_core.reading.formats import OF_VTK
 from imgquad_core.writers.neighbours import files_of
 from imgquad_mesh import outputs
-from imgquad_mesh.memory import limit_memory
+from imgquad_mesh.memory import give_large_blocks_back, limit_memory
 
 from . import packing
 from .recipe import PROPERTIES, Recipe, recipe_of
@@ -106,6 +106,7 @@ def _assert_whole(path: Path, name: str) -> None:
 def work(pipe: Connection, folder: str, pixels: int, memory: int) -> None:
     """Answer tasks until the pipe is closed."""
     limit_memory(memory, "RLIMIT_DATA")
+    give_large_blocks_back()
     desk = Desk(Path(folder), pixels)
     while True:
         try:

@@ -1,0 +1,37 @@
+"""Memory of child processes: limits, and what is given back."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+import sys
+
+import pytest
+
+KEEPING = """
+import numpy as np, sys
+from imgquad_mesh.memory import give_large_blocks_back
+
+def used():
+    return int(open("/proc/self/statm").read().split()[1]) * 4096
+
+if sys.argv[1] == "back":
+    give_large_blocks_back()
+np.ones(2_000_000)  # 16 MB: glibc takes blocks up to this size for small ones from here on
+before = used()
+blocks = [np.ones(2_000_000) for _ in range(8)]
+last = np.ones(10_000)  # stands behind them
+del blocks
+print(used() - before)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="of glibc only")
+def test_large_blocks_go_back_to_the_system() -> None:
+    kept = {
+        how: int(
+            subprocess.run([sys.executable, "-c", KEEPING, how], capture_output=True, text=True, check=True).stdout
+        )
+        for how in ("back", "as it is")
+    }
+    assert kept["back"] < 10e6 < kept["as it is"]
