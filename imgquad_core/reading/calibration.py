@@ -29,6 +29,8 @@ _NAMES: Mapping[str, str] = {
 }  # fmt: skip
 #: relative difference of the two sides below which a pixel counts as square
 SQUARE = 1e-3
+#: a printing density is told where it means smaller pixels than this, m: then it may come from a microscope
+TELLING = 10e-6
 
 
 def unit_name(text: str) -> str | None:
@@ -87,6 +89,12 @@ def size_of(x: float, y: float, unit: str, source: str, doubt: str = "") -> Pixe
     if name is None or not (isfinite(x) and isfinite(y) and x > 0.0 and y > 0.0):
         return None
     return PixelSize(float(x), float(y), name, source, doubt)
+
+
+def printing_density(x: float, y: float, unit: str, source: str) -> PixelSize | None:
+    """Tell dots an inch or a centimetre where they are finer than printers are, and that they may be of printing."""
+    size = size_of(1.0 / x, 1.0 / y, unit, source, "a resolution tag alone is a printing density")
+    return in_handy_unit(size) if size and METRES[size.unit] * size.x < TELLING else None
 
 
 def in_handy_unit(size: PixelSize) -> PixelSize:

@@ -15,11 +15,10 @@ from PIL import Image, UnidentifiedImageError
 
 from imgquad_core.errors import InputError
 
-from .calibration import Calibration, in_handy_unit, size_of
+from .calibration import Calibration, printing_density
 from .decoding import Stack, assert_pixels, decoding, missing_extra, upright
 from .options import ReadOptions
 from .picture import Picture, picture_of
-from .tiff_pixel_size import TELLING
 
 #: Pillow's names of what it is let to read
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "DIB", "PPM", "GIF", "WEBP")
@@ -175,8 +174,4 @@ def _density(image: Any) -> Any:
         x, y = (float(part) for part in image.info["dpi"][:2])
     except (KeyError, TypeError, ValueError):
         return None
-    if not (x > 0.0 and 0.0254 / x < TELLING):
-        return None
-    doubt = "a resolution in dots per inch is a printing density"
-    size = size_of(1.0 / x, 1.0 / y, "inch", "resolution of the picture", doubt) if y > 0.0 else None
-    return in_handy_unit(size) if size else None
+    return printing_density(x, y, "inch", "resolution of the picture") if x > 0.0 and y > 0.0 else None

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from .calibration import PixelSize, in_handy_unit, size_of
+from .calibration import PixelSize, in_handy_unit, printing_density, size_of
 
-#: a printing density is told where it means smaller pixels than this, m: then it may come from a microscope
-TELLING = 10e-6
 RESIZED = "the file says it of {} columns and has {}: it was resized"
 
 
@@ -115,11 +113,7 @@ def _density(file: Any, page: Any) -> PixelSize | None:
     """Tell a printing density where it is finer than printers are: never taken."""
     unit = {2: "inch", 3: "cm"}.get(int(page.tags.valueof(296, default=2)))
     x, y = (_ratio(page.tags.valueof(code)) for code in (282, 283))
-    metres = {"inch": 0.0254, "cm": 0.01}.get(unit or "", 0.0)
-    if unit is None or not 0.0 < metres / x < TELLING:
-        return None
-    size = size_of(1.0 / x, 1.0 / y, unit, "TIFF XResolution", "a resolution tag alone is a printing density")
-    return in_handy_unit(size) if size else None
+    return printing_density(x, y, unit, "TIFF XResolution") if unit else None
 
 
 def _ratio(value: tuple[int, int]) -> float:
