@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .arrays import Flags, Floats, Ints
+from .grouping import rows_of
 from .model import VOID, BoundaryGraph, PointKind
 
 
@@ -26,7 +27,7 @@ def places_of(chain_points: Ints, offsets: Ints) -> Places:
     at = np.delete(np.arange(len(chain_points)), offsets[1:] - 1)
     before = at - 1
     before[offsets[:-1] - np.arange(len(offsets) - 1)] = offsets[1:] - 2
-    chain = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets) - 1)
+    chain = rows_of(offsets, gaps=True)
     return Places(chain, at, chain_points[at], chain_points[before], chain_points[at + 1])
 
 
@@ -81,7 +82,7 @@ def without_unused_points(graph: BoundaryGraph) -> tuple[BoundaryGraph, Ints]:
 
 def chain_of_places(graph: BoundaryGraph) -> Ints:
     """Return the chain of each entry of `chain_points`."""
-    return np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets))
+    return rows_of(graph.chain_offsets)
 
 
 def _split(graph: BoundaryGraph, split: Flags) -> BoundaryGraph:

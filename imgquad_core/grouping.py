@@ -8,6 +8,11 @@ from .arrays import Ints, Labels
 from .jit import kernel, verb
 
 
+def rows_of(offsets: Ints, gaps: bool = False) -> Ints:
+    """Return the row of each item of a table whose rows begin at `offsets`, or of each gap between two of its items."""
+    return np.repeat(np.arange(len(offsets) - 1), np.diff(offsets) - gaps)
+
+
 @verb
 def add_up(counts: Ints) -> None:
     """Replace counts by their running sum."""

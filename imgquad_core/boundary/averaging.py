@@ -25,6 +25,7 @@ import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.conflicts import CROSSING, find_conflicts, snapped
+from imgquad_core.grouping import rows_of
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import BoundaryGraph, PointKind
 
@@ -142,7 +143,7 @@ def _in_conflict(
     curves: Curves, ends: Ends, at: Floats, graph: BoundaryGraph, new: Flags, units: Floats | float
 ) -> Flags:
     """Tell which dense points lie under samples that cross others, change the order at a node or turn a region."""
-    chain = np.repeat(np.arange(len(new)), np.diff(graph.chain_offsets) - 1)
+    chain = rows_of(graph.chain_offsets, gaps=True)
     marks = find_conflicts(graph.points, graph.segments, chain, new, graph.shape, units)
     k = np.flatnonzero(marks >= CROSSING)
     low, high = at[k + chain[k]].astype(np.int64), np.ceil(at[k + chain[k] + 1]).astype(np.int64)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
+from imgquad_core.grouping import rows_of
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
 
@@ -235,7 +236,7 @@ def rings(raw: Floats, offsets: Ints, node_offsets: Ints, sockets: Ints) -> tupl
     chain, is_end = sockets // 2, sockets % 2 == 1
     at = np.where(is_end, offsets[chain + 1] - 1, offsets[chain])
     step = raw[np.where(is_end, at - 1, at + 1)] - raw[at]
-    node = np.repeat(np.arange(len(node_offsets) - 1), np.diff(node_offsets))
+    node = rows_of(node_offsets)
     turn = np.arctan2(step[:, 1], step[:, 0])
     order = sockets[np.lexsort((turn, node))]
     ring = np.full(2 * (len(offsets) - 1), -1, np.int64)

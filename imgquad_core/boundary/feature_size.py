@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints
-from imgquad_core.grouping import grouped
+from imgquad_core.grouping import grouped, rows_of
 from imgquad_core.jit import kernel, verb
 from imgquad_core.threads import even_parts, in_threads
 
@@ -58,7 +58,7 @@ def local_feature_size(
     float64, shape (n,)
         Distance in pixels, infinity where nothing foreign was found within about `reach`.
     """
-    chain = np.repeat(np.arange(len(curves.ends)), np.diff(curves.offsets))
+    chain = rows_of(curves.offsets)
     corner = np.full(len(points), -1) if corner is None else corner
     lfs = np.full(len(points), np.inf)
     stride, level = 1, min(_REACH, reach)

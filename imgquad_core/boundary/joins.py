@@ -21,6 +21,7 @@ import numpy as np
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.geometry.conflicts import CROSSING, UNITS, find_conflicts, snapped
+from imgquad_core.grouping import rows_of
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, PointKind
 
@@ -78,9 +79,9 @@ def join_short_chains(
     rank = _ranks(ends.place, ends.kind, chains.graph.shape)
     is_outer = (chains.graph.chain_regions == VOID).any(axis=1)
     on_outer = np.zeros(len(rank), bool)
-    on_outer[np.repeat(np.arange(len(rank)), np.diff(ends.offsets))[is_outer[ends.sockets // 2]]] = True
+    on_outer[rows_of(ends.offsets)[is_outer[ends.sockets // 2]]] = True
     grid = _grid_of(curves.raw, chains.graph.shape, max(shortest, 2.0))
-    chain = np.repeat(np.arange(len(curves.ends)), np.diff(curves.offsets))
+    chain = rows_of(curves.offsets)
     for attempt in range(_ATTEMPTS):
         net = Net(
             curves.raw,
@@ -267,7 +268,7 @@ def _nodes_in_conflict(chains: PixelChains, net: Net, which: Ints, units: Floats
     graph = chains.graph
     ends = net.node[which]
     has_spoke = (ends >= 0) & (net.reach[ends] > 0.0)
-    chain = np.repeat(np.arange(len(which)), np.diff(graph.chain_offsets) - 1)
+    chain = rows_of(graph.chain_offsets, gaps=True)
     marks = find_conflicts(graph.points, graph.segments, chain, has_spoke.any(axis=1), graph.shape, units)
     is_hit = np.zeros(len(which), bool)
     is_hit[chain[marks >= CROSSING]] = True

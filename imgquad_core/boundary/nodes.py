@@ -19,6 +19,7 @@ import numpy as np
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.chains import places_of
 from imgquad_core.geometry.conflicts import CROSSING, SHARP, find_conflicts
+from imgquad_core.grouping import rows_of
 from imgquad_core.jit import kernel, verb
 
 from .curves import Curves, Ends, numbered
@@ -49,7 +50,7 @@ def mark_sharp(
     is_sharp = _is_sharp(points, places.here, places.before, places.after, least)
     is_sharp[first] &= chain_points[offsets[:-1]] == chain_points[offsets[1:] - 1]
     sharp = [np.flatnonzero(is_sharp), previous[is_sharp]]
-    node = np.repeat(np.arange(len(node_offsets) - 1), np.diff(node_offsets))
+    node = rows_of(node_offsets)
     segment = np.where(sockets % 2, last[sockets // 2], first[sockets // 2])
     far = np.where(sockets % 2, places.here[segment], places.after[segment])
     for step in range(1, int(np.diff(node_offsets).max(initial=0))):

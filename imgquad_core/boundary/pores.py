@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints
-from imgquad_core.grouping import linked
+from imgquad_core.grouping import linked, rows_of
 from imgquad_core.model import VOID, BoundaryGraph
 
 from .curves import curves_of, on_frame, rings
@@ -83,7 +83,7 @@ def _swept(graph: BoundaryGraph) -> Floats:
     is_across = (p[:, 0] % 1.0 != 0.0)[:, None]
     corner = np.where(is_across, np.stack([q[:, 0], p[:, 1]], axis=1), np.stack([p[:, 0], q[:, 1]], axis=1))
     swept = 0.5 * (_cross(p, corner) + _cross(corner, q))
-    chain = np.repeat(np.arange(graph.n_chains), np.diff(graph.chain_offsets))[:-1]
+    chain = rows_of(graph.chain_offsets)[:-1]
     swept[graph.chain_offsets[1:-1] - 1] = 0.0  # from the end of a chain to the start of the next
     return np.asarray(np.bincount(chain, swept, graph.n_chains), np.float64)
 

@@ -23,6 +23,7 @@ import scipy
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.geometry.conflicts import CROSSING, UNITS, find_conflicts
+from imgquad_core.grouping import rows_of
 from imgquad_core.jit import kernel
 from imgquad_core.model import BoundaryGraph, PointKind
 
@@ -130,7 +131,7 @@ def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
         sides = np.where(stays[runs.chain], np.rint(runs.length).astype(np.int64), number)
         raw, side, offsets = _draw(runs.chain, begin, end, runs.axis, sides, is_closed)
         made = _graph(graph, raw, offsets, is_closed, size)
-        chain = np.repeat(np.arange(len(stays)), np.diff(offsets) - 1)
+        chain = rows_of(offsets, gaps=True)
         marks = find_conflicts(made.points, made.segments, chain, ~stays, made.shape, UNITS * size)
         bad = np.unique(chain[marks >= CROSSING])
         if stays[bad].all():

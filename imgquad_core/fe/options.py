@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from imgquad_core.declared import check, option
 from imgquad_core.errors import InputError
+
+#: what `interfaces` may be asked to make of the elements; other words are of writers
+BETWEEN = ("sides", "none")
+
+
+def interface_options(asked: str | None) -> dict[str, Any]:
+    """Return the options of `ElementOptions` that "sides" (open) or "none" (not marked) stands for."""
+    return {"open_interfaces": asked == "sides", "mark_interfaces": asked != "none"}
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import imgquad_core as core
+from imgquad_core.fe.options import BETWEEN, interface_options
 
 from .datasets.grids import from_grid
 
@@ -40,6 +41,6 @@ def save_grid(dataset: Any, path: str | Path, **options: Any) -> None:
     """
     known = ("order", "nodes", "cohesive", "extrude", "layers", "periodic", "split_quads")
     chosen = {name: options.pop(name) for name in known if name in options}
-    between = options.pop("interfaces") if options.get("interfaces") in ("sides", "none") else None
-    elements = core.fe.ElementOptions(**chosen, open_interfaces=between == "sides", mark_interfaces=between != "none")
+    between = options.pop("interfaces") if options.get("interfaces") in BETWEEN else None
+    elements = core.fe.ElementOptions(**chosen, **interface_options(between))
     core.writers.write_mesh(core.fe.make_elements(from_grid(dataset), elements), path, **options)

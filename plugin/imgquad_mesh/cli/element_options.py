@@ -9,6 +9,7 @@ from typing import Any
 import imgquad_core as core
 from imgquad_core.errors import InputError
 from imgquad_core.fe import ElementOptions
+from imgquad_core.fe.options import BETWEEN, interface_options
 from imgquad_mesh.texts import number
 
 from .declared_options import add_declared, asked
@@ -17,8 +18,6 @@ from .declared_options import add_declared, asked
 WRITER_OPTIONS = ("analysis", "reduced", "thickness", "properties", "deck", "regions", "interfaces", "version", "plain")
 #: options of the formats that PyVista writes
 PLAIN = {".vtu": ("plain",), ".vtk": ("plain",)}
-#: what --interfaces makes of the elements; the others are of writers
-BETWEEN = ("sides", "none")
 
 
 def add_element_options(parser: argparse.ArgumentParser) -> None:
@@ -51,8 +50,7 @@ def element_options(args: argparse.Namespace) -> ElementOptions:
     return ElementOptions(
         **asked(args, ElementOptions),
         periodic=periodic,
-        open_interfaces=args.interfaces == "sides",
-        mark_interfaces=args.interfaces != "none",
+        **interface_options(args.interfaces),
     )
 
 
