@@ -14,7 +14,7 @@ import pytest
 from imgquad_core import MeshOptions
 from imgquad_core.boundary import ExtractionOptions, SmoothingOptions
 from imgquad_core.cleanup import OptimizationOptions
-from imgquad_core.cleanup.optimization import EFFORTS as CLEAN_UPS
+from imgquad_core.cleanup.optimization import CLEAN_UPS
 from imgquad_core.declared import check, declarations, option, same_as
 from imgquad_core.errors import InputError
 from imgquad_core.fe import ElementOptions
