@@ -224,7 +224,7 @@ def test_no_data_of_an_integer_geotiff_is_void(tmp_path: Path, dtype: type, text
     values: Array = (grains(80) % 22).astype(dtype)
     values[:120] = int(text)  # half of them, as in pylandstats' map
     found = found_in(save_tif(extratags=no_data_tag(text))(tmp_path / "a", values))
-    assert (found.image.labels == np.where(values == int(text), -1, values)).all()
+    assert (found.image.labels == np.where(values == int(text), -1, values.astype(np.int64))).all()
     path = save_tif()(tmp_path / "b", values)
     if int(text) < 0:
         with pytest.raises(InputError, match=f"no_data = {text}"):
