@@ -39,5 +39,5 @@ def write_npz(mesh: FEMesh, path: str | Path) -> None:
         arrays |= {f"{group}/{name.replace('/', '_')}": ids for name, ids in sets.items()}
     whole = BytesIO()  # NumPy's archive is noisy where a disk fills up
     np.savez_compressed(whole, **arrays)
-    with replacing(path) as temporary, whole.getbuffer() as view:
-        temporary.write_bytes(view)
+    with replacing(path) as temporary:
+        temporary.write_bytes(whole.getvalue())  # no copy, and no view of bytes that an error keeps
