@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from processes import FailedError
@@ -51,6 +52,20 @@ def table(titles: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1) 
 def limit_table(rows: Iterable[Sequence[str]]) -> str:
     """Return the table of rows of `Limit`s."""
     return table(("where", "figure", "limit", "found", "met"), rows, words=2)
+
+
+def put_into(path: Path, part: str, text: str) -> None:
+    """Put `text` between the two marks of a part of a page."""
+    path.write_text(replaced(path.read_text(encoding="utf-8"), part, text), encoding="utf-8")
+
+
+def replaced(page: str, part: str, text: str) -> str:
+    """Return the page with `text` between the two marks of a part."""
+    begin, end = (f"<!-- {word}: {part} -->\n" for word in ("begin", "end"))
+    if page.count(begin) != 1 or page.count(end) != 1:
+        raise SystemExit(f"the page needs the lines {begin.strip()} and {end.strip()} once each: put them in")
+    before, rest = page.split(begin)
+    return f"{before}{begin}\n{text}\n{end}{rest.split(end)[1]}"
 
 
 def ours(report: dict[str, Any]) -> dict[str, float]:

@@ -1,10 +1,11 @@
 """How good are meshes of real pictures, ours and Gmsh's? Prints the section "pictures" of docs/benchmarks.md.
 
     python benchmarks/real_pictures.py [FOLDER]
-    python benchmarks/real_pictures.py --judge RECORDS [--only NAME ...]
+    python benchmarks/real_pictures.py --judge RECORDS [--only NAME ...] [--out docs/sizes.md]
 
 The second one meshes the pictures at four sizes and three tolerances, has each mesh judged by a program that has no
-code of this project, and prints the section "sizes". What stands in the file RECORDS, a line a mesh, is not done again.
+code of this project, and prints the section "judged". What stands in the file RECORDS, a line a mesh, is not done
+again.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from figure_tables import FIGURES, NONE, Limit, limit_table, ours, table
+from figure_tables import FIGURES, NONE, Limit, limit_table, ours, put_into, table
 from imgquad_mesh.__main__ import main as command
 from processes import ROOT, FailedError, mesh_picture
 from pyvista_pictures import PICTURES
@@ -56,7 +57,7 @@ def section(folder: Path, pictures: Path = FOLDER) -> str:
     if not pictures.is_dir():
         return f"**No real pictures: there is no folder {pictures.name}. Nothing is measured here.**\n"
     found: dict[str, Figures] = {}
-    for picture in sorted(p for p in pictures.iterdir() if p.suffix.lower() in PICTURES):
+    for picture in pictures_of(pictures):
         for size in LARGE.get(picture.stem, SIZES):
             found |= measured(picture, size, folder)
     note = (
@@ -64,6 +65,11 @@ def section(folder: Path, pictures: Path = FOLDER) -> str:
         "quads: more would take it minutes.\n"
     )
     return "\n".join([note, figures_table(found), limits(found)])
+
+
+def pictures_of(folder: Path) -> list[Path]:
+    """Return the pictures of a folder, by name."""
+    return sorted(path for path in folder.iterdir() if path.suffix.lower() in PICTURES)
 
 
 def measured(picture: Path, size: float, folder: Path) -> dict[str, Figures]:
@@ -108,8 +114,7 @@ class Judged(NamedTuple):
 
 def judged_runs(pictures: Path, only: Iterable[str]) -> Iterator[tuple[Path, Judged]]:
     """Name the runs, those of the coarsest meshes first."""
-    chosen = [p for p in sorted(pictures.iterdir()) if p.suffix.lower() in PICTURES]
-    chosen.sort(key=lambda path: path.stat().st_size)
+    chosen = sorted(pictures_of(pictures), key=lambda path: path.stat().st_size)
     wanted = set(only)
     for share in TOLERANCES:
         for size in JUDGED_SIZES:
@@ -209,9 +214,13 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?", default=FOLDER, help="of pictures")
     parser.add_argument("--judge", type=Path, metavar="RECORDS", help="mesh at several sizes and tolerances and judge")
     parser.add_argument("--only", nargs="*", default=(), metavar="NAME", help="pictures that are judged")
+    parser.add_argument("--out", type=Path, metavar="PAGE", help="page that holds the marks of what was judged")
     given = parser.parse_args()
     if given.judge:
-        print(judged_section(judge_all(given.judge, given.folder, given.only)))
+        text = judged_section(judge_all(given.judge, given.folder, given.only))
+        print(text)
+        if given.out:
+            put_into(given.out, "judged", text)
         return
     with tempfile.TemporaryDirectory() as temporary:
         print(section(Path(temporary), given.folder))

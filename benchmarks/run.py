@@ -30,6 +30,7 @@ import speed
 import triangulators
 import waits
 import wedges
+from figure_tables import put_into, replaced
 from imgquad_mesh.outputs.report import versions
 
 PARTS: dict[str, Callable[[Path], str]] = {
@@ -66,17 +67,7 @@ def main() -> None:
         text = f"{text}\n{circumstances(part, perf_counter() - start)}\n"
         print(text, flush=True)
         if given.out:
-            page = replaced(given.out.read_text(encoding="utf-8"), part, text)
-            given.out.write_text(page, encoding="utf-8")
-
-
-def replaced(page: str, part: str, text: str) -> str:
-    """Return the page with `text` between the two marks of a part."""
-    begin, end = (f"<!-- {word}: {part} -->\n" for word in ("begin", "end"))
-    if page.count(begin) != 1 or page.count(end) != 1:
-        raise SystemExit(f"the page needs the lines {begin.strip()} and {end.strip()} once each: put them in")
-    before, rest = page.split(begin)
-    return f"{before}{begin}\n{text}\n{end}{rest.split(end)[1]}"
+            put_into(given.out, part, text)
 
 
 def circumstances(part: str, seconds: float) -> str:

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from figure_tables import Limit
+from figure_tables import Limit, replaced
 from gmsh_routes import ROUTES, coarse_curves, gmsh_mesh
 from growth import exponent
 from imgquad_core import MeshOptions, QuadMesh, mesh_image
 from imgquad_core.measures.quality import quad_areas
 from rocks import MINERALS, rock, uniform
-from run import PARTS, replaced
+from run import PARTS
 from support import ROOT, naive
 from support.labels import voronoi
 
@@ -70,6 +70,8 @@ def test_the_page_has_a_place_for_each_part() -> None:
         assert before.replace("\none\n", "\nother\n") == after
     with pytest.raises(SystemExit, match="begin: speed"):
         replaced("nothing", "speed", "text")
+    sizes = (ROOT / "docs" / "sizes.md").read_text(encoding="utf-8")
+    assert all("\none\n" in replaced(sizes, part, "one") for part in ("bars", "judged"))
 
 
 def test_the_rocks_are_those_that_were_measured() -> None:

@@ -21,12 +21,12 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from imgquad_core.arrays import Flags, Floats, Ints, Labels
+from imgquad_core.arrays import Flags, Floats, Labels
 from imgquad_core.geometry.corner_rule import corner_rule
 from imgquad_core.model import VOID, LabelImage
 from imgquad_core.orientation import turn_of_image
 
-from .clusters import labelled_clusters
+from .clusters import labelled_clusters, roots_of
 from .cores import distances, flood, near_core
 from .options import AbsorbOptions
 from .rounding import BELL_ENDS, rounded
@@ -127,11 +127,9 @@ def areas_of_origin(before: Labels, after: Labels, rule: int) -> Floats:
         In pixels; regions are numbered in the order of their first pixels. Those of the old picture give their area
         to their rests, by overlap; where nothing is left of one, its pixels count for the regions that they are in.
     """
-    old = _roots(labelled_clusters(before, rule).parent.astype(np.int64).ravel())
+    old = roots_of(labelled_clusters(before, rule))
     solid = after.ravel() != VOID
-    first, region = np.unique(
-        _roots(labelled_clusters(after, rule).parent.astype(np.int64).ravel())[solid], return_inverse=True
-    )
+    first, region = np.unique(roots_of(labelled_clusters(after, rule))[solid], return_inverse=True)
     same = solid & (before == after).ravel()
     total = np.bincount(old[solid], minlength=len(old))
     rest = np.bincount(old[same], minlength=len(old))
@@ -139,14 +137,6 @@ def areas_of_origin(before: Labels, after: Labels, rule: int) -> Floats:
     areas = np.bincount(region, share[solid], len(first))
     pixels = np.bincount(region, minlength=len(first))
     return np.asarray(np.maximum(areas, 0.5 * pixels))
-
-
-def _roots(parent: Ints) -> Ints:
-    while True:
-        above = parent[parent]
-        if np.array_equal(above, parent):
-            return parent
-        parent = above
 
 
 def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[Labels, bool]:
@@ -174,8 +164,7 @@ def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[L
 def _kept(labels: Labels, stays: Flags, radius: float, rule: int) -> Flags:
     """Tell which pixels stay: near a core of a region that is large enough."""
     clusters = labelled_clusters(labels, rule)
-    root = _roots(clusters.parent.astype(np.int64).ravel())
-    small = (clusters.pixels.ravel()[root] < 4.0 * radius * radius).reshape(labels.shape)
+    small = (clusters.pixels[roots_of(clusters)] < 4.0 * radius * radius).reshape(labels.shape)
     kept = near_core(labels, distances(labels), radius, CORNER * radius)
     return np.asarray((kept & ~small) | stays)
 
@@ -206,9 +195,7 @@ def _balanced(labels: Labels, stays: Flags, width: float) -> Labels:
 
 def _accounts(before: Labels, after: Labels, times: int, options: AbsorbOptions) -> tuple[Absorption, ...]:
     """Tell for each material what it lost and gained."""
-    root = _roots(
-        labelled_clusters(before, corner_rule(options.policy, options.step * times)).parent.astype(np.int64).ravel()
-    )
+    root = roots_of(labelled_clusters(before, corner_rule(options.policy, options.step * times)))
     stays = (before == after).ravel() & (before != VOID).ravel()
     is_left = np.zeros(before.size, bool)
     is_left[root[stays]] = True

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Labels
+from imgquad_core.arrays import Ints, Labels
 from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, joined_pair
 from imgquad_core.grouping import unite
 from imgquad_core.jit import kernel
@@ -31,6 +31,16 @@ def labelled_clusters(colors: Labels, rule: int) -> Clusters:
     clusters = Clusters(pixels, np.ones(n, np.int32), np.full(n, -1, np.int32), pixels.copy())
     label_clusters(colors, clusters, rule)
     return clusters
+
+
+@kernel
+def roots_of(clusters: Clusters) -> Ints:
+    """Return the root of each pixel, in reading order: parents come before their pixels."""
+    root = np.empty(len(clusters.parent), np.int64)
+    for p in range(len(root)):
+        parent = clusters.parent[p]
+        root[p] = p if parent == p else root[parent]
+    return root
 
 
 @kernel
