@@ -1,4 +1,4 @@
-"""Do sizes, growth, stairs, joins and tolerances give what they promise? Prints the section "bars" of docs/sizes.md.
+"""Do sizes, growth, stairs, joins and tolerances give what they promise? Prints the tables of docs/sizes.md.
 
     python benchmarks/sizes.py [--out docs/sizes.md] [--only WORD ...]
 
@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from make_images import coast
 
-from figure_tables import Limit, limit_table, put_into
+from figure_tables import Limit, limit_table, put_into, table
 from imgquad_core import MeshOptions
 from imgquad_core import run as run_all
 from imgquad_core.arrays import Floats, Labels
@@ -308,6 +308,32 @@ PARTS: dict[str, Callable[[], Iterable[list[str]]]] = {
 }
 
 
+def coasts() -> str:
+    """Return the table of a coast at several tolerances."""
+    tolerances = (0.0, 8.0, 16.0)
+    quads = [f"{meshed(coast(), size=16.0, tolerance=t).quads:,}" for t in tolerances]
+    titles = ["picture, size 16", "quads as it is", *(f"tolerance {t:g}" for t in tolerances[1:])]
+    return table(titles, [["coast, 300 x 300", *quads]])
+
+
+def kept() -> str:
+    """Return the table of pictures of which everything is kept."""
+    rows = []
+    for what, name, size, tolerance in (
+        ("brain", BRAIN, 8.0, 4.0),
+        ("bone", "bone_trabecular_uct_0000", 16.0, 8.0),
+        ("concrete with a crack", "concrete_crack_segmented", 16.0, 8.0),
+        ("duplex steel", STEEL, 8.0, 4.0),
+        ("battery electrode", "battery_nmc_cbd_labels", 8.0, 4.0),
+    ):
+        labels = segment_source(read_picture(FOLDER / f"{name}.png")).image.labels
+        plain = meshed(labels, size=size)
+        found = meshed(labels, size=size, tolerance=tolerance, keep=np.unique(labels).tolist())
+        where = f"{what}, size {size:g}, tolerance {tolerance:g}"
+        rows.append([where, f"{plain.quads:,}", f"{found.quads:,}", f"{found.min_sj:.2f}"])
+    return table(["picture, everything kept", "quads as it is", "with tolerance", "min SJ"], rows)
+
+
 def section(only: Iterable[str] = ()) -> str:
     """Return the table of bars."""
     wanted = set(only) or set(PARTS)
@@ -319,10 +345,11 @@ def main() -> None:
     parser.add_argument("--out", type=Path, metavar="PAGE", help="page that holds the marks")
     parser.add_argument("--only", nargs="*", default=(), choices=list(PARTS), metavar="PART", help="some parts")
     given = parser.parse_args()
-    text = section(given.only)
-    print(text)
-    if given.out:
-        put_into(given.out, "bars", text)
+    tables = {"bars": section(given.only)} | ({} if given.only else {"coast": coasts(), "kept": kept()})
+    for name, text in tables.items():
+        print(text)
+        if given.out:
+            put_into(given.out, name, text)
 
 
 if __name__ == "__main__":
