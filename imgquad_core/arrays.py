@@ -21,7 +21,9 @@ _DTYPES: Mapping[str, DTypeLike] = {"Floats": np.float64, "Ints": np.int64, "Lab
 
 
 def read_only(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
-    """Return a copy that cannot be changed, row after row in memory."""
+    """Return a copy that cannot be changed, row after row in memory; what is mapped from a file to read, as it is."""
+    if isinstance(values, np.memmap) and values.dtype == dtype and values.flags.c_contiguous and values.mode == "r":
+        return values
     array = np.array(values, dtype=dtype, order="C")
     array.flags.writeable = False
     return array

@@ -49,11 +49,9 @@ def trace_mesh(
     _assert_manifold(corners, len(xy))
     region, region_label = _regions(twin, label)
     beside = np.where(twin >= 0, region[twin // 4], VOID)
+    once, edges = boundary_edges(corners, twin, region)
     own = np.repeat(region, 4)
-    bound = np.flatnonzero(own != beside)
-    once = bound[(twin[bound] < 0) | (bound < twin[bound])]
-    edges = np.stack([corners.ravel()[once], np.roll(corners, -1, axis=1).ravel()[once]], axis=1)
-    kind = _kinds(xy, edges)
+    kind = point_kinds(xy, edges, np.stack([xy.min(axis=0), xy.max(axis=0)]))
     chains, first = _walk(edges, kind, len(xy))
     left, right = own[once], beside[once]
     sides = [(left[e], right[e]) if forward else (right[e], left[e]) for e, forward in first]
@@ -101,11 +99,19 @@ def _regions(twin: Ints, label: Labels) -> tuple[Ints, Labels]:
     return region, of_region
 
 
-def _kinds(points: Floats, edges: Ints) -> Bytes:
+def boundary_edges(quads: Ints, twin: Ints, region: Ints) -> tuple[Ints, Ints]:
+    """Return the half-edges between regions and on the rim, one of two, and their ends, shape (n, 2)."""
+    bound = np.flatnonzero(np.where(twin >= 0, region[twin // 4], VOID) != np.repeat(region, 4))
+    once = bound[(twin[bound] < 0) | (bound < twin[bound])]
+    return once, np.stack([quads.ravel()[once], np.roll(quads, -1, axis=1).ravel()[once]], axis=1)
+
+
+def point_kinds(points: Floats, edges: Ints, box: Floats) -> Bytes:
+    """Return the kind of each point from the edges of boundaries; `box` has the least and largest x and y."""
     degree = np.bincount(edges.ravel(), minlength=len(points))
     kind = np.full(len(points), PointKind.INTERIOR, np.uint8)
     kind[degree == 2] = PointKind.FREE
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = box
     near = 1e-9 * float((high - low).max())
     on_box = (points - low <= near) | (high - points <= near)
     kind[on_box.any(axis=1) & (degree > 0)] = PointKind.FRAME

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from imgquad_core.arrays import Ints
+from imgquad_core.arrays import Floats, Ints
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.model import PointKind, QuadMesh
@@ -18,6 +19,10 @@ from .femesh import FEMesh, Names, name_materials
 
 BORDERS = ("left", "right", "bottom", "top")
 CORNERS = ("bottom_left", "bottom_right", "top_right", "top_left")
+BORDER, BETWEEN, FREE = range(3)
+
+#: which sides: (BORDER, place in `BORDERS`, 0), (BETWEEN, material, that it faces), (FREE, material, 0)
+Key: TypeAlias = tuple[int, int, int]
 
 
 def fe_mesh(mesh: QuadMesh) -> FEMesh:
@@ -54,19 +59,8 @@ def fe_mesh(mesh: QuadMesh) -> FEMesh:
     """
     if mesh.n_quads == 0:
         raise InputError("the mesh has no quads: nothing to write; was every material dropped?")
-    names = name_materials(mesh.quad_material, mesh.materials)
-    node_sets: dict[str, Ints] = {}
-    side_sets: dict[str, Ints] = {}
-    claimed = Names()
-    for wanted, sides, with_nodes in _named_sides(mesh, names):
-        name = claimed.claim(wanted)
-        side_sets[name] = sides
-        if with_nodes:
-            node_sets[name] = np.unique(_ends(mesh, 4 * sides[:, 0] + sides[:, 1]))
-    node_sets.update(_corner_sets(mesh, node_sets))
-    junctions = np.flatnonzero((mesh.point_kind == PointKind.JUNCTION) & (mesh.valence > 0))
-    if len(junctions):
-        node_sets["junctions"] = junctions
+    box = np.stack([mesh.points.min(axis=0), mesh.points.max(axis=0)])
+    named = name_sets(find_sets(mesh, box), name_materials(mesh.quad_material, mesh.materials))
     return FEMesh(
         points=mesh.points,
         kind="quad4",
@@ -74,13 +68,79 @@ def fe_mesh(mesh: QuadMesh) -> FEMesh:
         cell_material=mesh.quad_material,
         cell_region=mesh.quad_region,
         materials=mesh.materials,
-        node_sets=node_sets,
-        side_sets=side_sets,
+        node_sets=named.nodes,
+        side_sets=named.sides,
         point_kind=mesh.point_kind,
         chain_offsets=mesh.chain_offsets,
         chain_points=mesh.chain_points,
-        element_sets=_at_interfaces(mesh, names),
+        element_sets=named.elements,
     )
+
+
+class FoundSets(NamedTuple):
+    """Sets of a mesh, or of a part of it, without names yet."""
+
+    sides: Mapping[Key, Ints]  #: (element, side), ascending
+    nodes: Mapping[Key, Ints]  #: of these sides; of those between two materials where the first has the lower number
+    near: Mapping[tuple[int, int], Ints]  #: elements of two materials with a node on their interface, ascending
+    at_any: Ints  #: elements with a node on any interface, ascending
+    junctions: Ints  #: nodes where three or more boundaries meet, ascending
+
+
+class NamedSets(NamedTuple):
+    """Sets with the names that they have in files."""
+
+    nodes: Mapping[str, Ints]
+    sides: Mapping[str, Ints]
+    elements: Mapping[str, Ints]
+
+
+def find_sets(mesh: QuadMesh, box: Floats) -> FoundSets:
+    """Find the sets of a mesh.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+        Of its points' kinds only `FREE`, which are on no border of the picture, and `JUNCTION` count.
+    box : float64, shape (2, 2)
+        Least and largest x and y of the picture.
+    """
+    twin = twins_of(mesh.quads, mesh.n_points)
+    sides = dict(_sides_found(mesh, twin, box))
+    with_nodes = (key for key in sides if key[0] != BETWEEN or key[1] < key[2])
+    nodes = {key: np.unique(_ends(mesh, 4 * sides[key][:, 0] + sides[key][:, 1])) for key in with_nodes}
+    near, at_any = _at_interfaces(mesh, twin)
+    junctions = np.flatnonzero((mesh.point_kind == PointKind.JUNCTION) & (mesh.valence > 0))
+    return FoundSets(sides, nodes, near, at_any, junctions)
+
+
+def name_sets(found: FoundSets, names: Mapping[int, str]) -> NamedSets:
+    """Name sets; `names` are those of the materials."""
+    claimed = Names()
+    of = {key: claimed.claim(_wanted_name(key, names)) for key in sorted(found.sides)}
+    node_sets = {name: found.nodes[key] for key, name in of.items() if key in found.nodes}
+    node_sets |= _corner_sets(node_sets)
+    if len(found.junctions):
+        node_sets["junctions"] = found.junctions
+    side_sets = {name: found.sides[key] for key, name in of.items()}
+    return NamedSets(node_sets, side_sets, _name_near(found, names))
+
+
+def _wanted_name(key: Key, names: Mapping[int, str]) -> str:
+    what, first, second = key
+    if what == BORDER:
+        return BORDERS[first]
+    return f"interface_{names[first]}_{names[second]}" if what == BETWEEN else f"free_{names[first]}"
+
+
+def _name_near(found: FoundSets, names: Mapping[int, str]) -> dict[str, Ints]:
+    if not len(found.at_any):
+        return {}
+    claimed = Names(names.values())
+    sets = {claimed.claim("interfaces"): found.at_any}
+    for a, b in sorted(found.near):
+        sets[claimed.claim(f"interface_{names[a]}_{names[b]}")] = found.near[a, b]
+    return sets
 
 
 def without_interfaces(mesh: FEMesh) -> FEMesh:
@@ -107,24 +167,23 @@ def _sides(half_edges: Ints) -> Ints:
     return np.stack([half_edges // 4, half_edges % 4], axis=1)
 
 
-def _named_sides(mesh: QuadMesh, names: dict[int, str]) -> Iterator[tuple[str, Ints, bool]]:
-    """(name, sides, are its nodes a set too) of borders, interfaces and free borders, each in a fixed order."""
-    twin = twins_of(mesh.quads, mesh.n_points)
+def _sides_found(mesh: QuadMesh, twin: Ints, box: Floats) -> Iterator[tuple[Key, Ints]]:
+    """Sides of borders, interfaces and free borders, each in the order of the elements."""
     outer = np.flatnonzero(twin < 0)
-    border = _border_of(mesh, _ends(mesh, outer))
-    for b, name in enumerate(BORDERS):
+    border = _border_of(mesh, _ends(mesh, outer), box)
+    for b in range(len(BORDERS)):
         if (border == b).any():
-            yield name, _sides(outer[border == b]), True
-    yield from _interfaces(mesh, twin, names)
+            yield (BORDER, b, 0), _sides(outer[border == b])
+    yield from _interfaces(mesh, twin)
     free = outer[border < 0]
     material = mesh.quad_material[free // 4]
     for m in np.unique(material):
-        yield f"free_{names[int(m)]}", _sides(free[material == m]), True
+        yield (FREE, int(m), 0), _sides(free[material == m])
 
 
-def _border_of(mesh: QuadMesh, ends: Ints) -> NDArray[np.int8]:
+def _border_of(mesh: QuadMesh, ends: Ints, box: Floats) -> NDArray[np.int8]:
     """Index in `BORDERS` of each border edge, -1 where the edge is not on the picture's border."""
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    low, high = box
     near = 1e-9 * float((high - low).max())
     # an edge of a dropped material may lie on the bounding box by chance: its nodes are FREE, those of a border never
     held = (mesh.point_kind[ends] != PointKind.FREE).all(axis=1)
@@ -134,7 +193,7 @@ def _border_of(mesh: QuadMesh, ends: Ints) -> NDArray[np.int8]:
     return border
 
 
-def _interfaces(mesh: QuadMesh, twin: Ints, names: dict[int, str]) -> Iterator[tuple[str, Ints, bool]]:
+def _interfaces(mesh: QuadMesh, twin: Ints) -> Iterator[tuple[Key, Ints]]:
     inner = np.flatnonzero(twin >= 0)
     own, other = mesh.quad_material[inner // 4], mesh.quad_material[twin[inner] // 4]
     differ = own != other
@@ -143,10 +202,10 @@ def _interfaces(mesh: QuadMesh, twin: Ints, names: dict[int, str]) -> Iterator[t
     order = np.argsort(of.ravel(), kind="stable")
     groups = np.split(inner[differ][order], np.cumsum(np.bincount(of.ravel(), minlength=len(unique)))[:-1])
     for (a, b), half_edges in zip(unique, groups, strict=False):
-        yield f"interface_{names[int(a)]}_{names[int(b)]}", _sides(half_edges), bool(a < b)
+        yield (BETWEEN, int(a), int(b)), _sides(half_edges)
 
 
-def _corner_sets(mesh: QuadMesh, node_sets: dict[str, Ints]) -> dict[str, Ints]:
+def _corner_sets(node_sets: Mapping[str, Ints]) -> dict[str, Ints]:
     empty = np.empty(0, np.int64)
     corners = {}
     for corner in CORNERS:
@@ -157,24 +216,20 @@ def _corner_sets(mesh: QuadMesh, node_sets: dict[str, Ints]) -> dict[str, Ints]:
     return corners
 
 
-def _at_interfaces(mesh: QuadMesh, names: dict[int, str]) -> dict[str, Ints]:
+def _at_interfaces(mesh: QuadMesh, twin: Ints) -> tuple[dict[tuple[int, int], Ints], Ints]:
     """Elements with a node on an interface: of each two materials, and of all."""
-    twin = twins_of(mesh.quads, mesh.n_points)
     inner = np.flatnonzero(twin >= 0)
     own, other = mesh.quad_material[inner // 4], mesh.quad_material[twin[inner] // 4]
     lower = inner[own < other]
     if not len(lower):
-        return {}
+        return {}, np.empty(0, np.int64)
     pairs, of = np.unique(np.stack([own, other], axis=1)[own < other], axis=0, return_inverse=True)
     cell, pair = _touching(mesh, _ends(mesh, lower), of.ravel(), len(pairs))
     between = (mesh.quad_material[cell][:, None] == pairs[pair]).any(axis=1)
-    claimed = Names(names.values())
-    sets = {claimed.claim("interfaces"): np.unique(cell)}
     order = np.lexsort((cell[between], pair[between]))
     ends = np.cumsum(np.bincount(pair[between], minlength=len(pairs)))
-    for (a, b), cells in zip(pairs.tolist(), np.split(cell[between][order], ends[:-1]), strict=True):
-        sets[claimed.claim(f"interface_{names[a]}_{names[b]}")] = cells
-    return sets
+    groups = np.split(cell[between][order], ends[:-1])
+    return {(a, b): cells for (a, b), cells in zip(pairs.tolist(), groups, strict=True)}, np.unique(cell)
 
 
 def _touching(mesh: QuadMesh, ends: Ints, pair: Ints, n_pairs: int) -> tuple[Ints, Ints]:

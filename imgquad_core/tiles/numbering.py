@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +53,11 @@ def owned(t: int, n_points: int, rims: dict[int, Rim]) -> Own:
     is_own = np.ones(n_points, bool)
     is_own[mine.at[owner != t]] = False
     return Own(is_own, owner, rank)
+
+
+def first_numbers(counts: Sequence[tuple[int, int]]) -> Ints:
+    """Return the number of each tile's first own node, and that of all nodes; `counts` has nodes and quads of tiles."""
+    return np.concatenate([[0], np.cumsum([own for own, _ in counts])]).astype(np.int64)
 
 
 def numbers_of(t: int, own: Own, rims: dict[int, Rim], owns: dict[int, Own], first: Ints) -> Ints:

@@ -168,6 +168,8 @@ def settled(
     KeyError
         Another tile does not have a chain or junction that it owns.
     """
+    if not len(mine.owner):
+        return mine
     known = {int(o): _Index.of(others(int(o))) for o in np.unique(np.append(mine.owner, mine.node[:, 1])) if o != t}
     points = mine.points.copy()
     for at, owner, row, column in mine.node.tolist():

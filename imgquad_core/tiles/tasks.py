@@ -10,6 +10,8 @@
     band       2, 4 tiles    clean-up across seams, in three rounds
     finish     tile          all patches in, its share of the report
     number     tile          which nodes are its own
+    ring       tile          for a solver's file: the quads around its rim, for its neighbours
+    sets       tile          the same: sets of its own nodes and quads
 
 What is there already is kept, so a run that was stopped goes on. Whoever is asked first for what another step leaves
 must be given it: steps take what must be done before as arguments that they do not look at.
@@ -26,7 +28,8 @@ from typing import Any
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints, Labels
-from imgquad_core.errors import TopologyError
+from imgquad_core.errors import InputError, TopologyError
+from imgquad_core.fe import FEMesh
 from imgquad_core.measures.quality import quad_areas, scaled_jacobian
 from imgquad_core.model import VOID
 from imgquad_core.options import MeshOptions
@@ -42,10 +45,11 @@ from imgquad_core.picture import (
 from imgquad_core.whole_files import replacing
 
 from .bands import ROUNDS, cleaned_band, groups_of, seam_places
+from .elements import COLUMNS, Mapped, Ring, as_arrays, joined_sets, named_elements, ring_of, tile_sets
 from .files import load_arrays, path_of, save_arrays, save_plane
 from .grid import Box, Grid
 from .meshes import Patch, TileMesh, mesh_outlines, open_nodes, patched
-from .numbering import Own, Rim, numbers_of, owned
+from .numbering import Own, Rim, first_numbers, numbers_of, owned
 from .outlines import Outlines, outlines_of, settled
 from .regions import Part, Regions, TileRegions, joined_regions, keys_of, tile_regions
 from .rules import Rules, load_rules, rules_of, save_rules
@@ -396,3 +400,57 @@ def node_numbers(job: Job, t: int, first: Ints) -> Ints:
     lower = [other for other in job.grid.around(t) if other <= t]
     owns = {other: Own(**load_arrays(job.path("own", other))) for other in lower}
     return numbers_of(t, owns[t], {other: _rim(job, other) for other in lower}, owns, first)
+
+
+# ------------------------------------------------------------------------------------------- for a solver's file
+
+
+def ring(job: Job, t: int, counts: Sequence[tuple[int, int]]) -> None:
+    """Leave the quads around the rim of a tile to its neighbours, with numbers of the whole picture."""
+    path = job.path("ring", t)
+    if not path.exists():
+        whole = _numbered(job, t, counts)
+        rim = np.zeros(len(whole.node), bool)
+        rim[final_mesh(job, t)["rim"]] = True
+        save_arrays(path, **ring_of(whole, rim)._asdict())
+
+
+def _numbered(job: Job, t: int, counts: Sequence[tuple[int, int]]) -> Ring:
+    """Return all quads of a tile, with numbers of the whole picture."""
+    found = final_mesh(job, t)
+    node = node_numbers(job, t, first_numbers(counts))
+    return Ring(node[found["quads"]], found["region"], found["label"], node, found["points"])
+
+
+def sets(job: Job, t: int, counts: Sequence[tuple[int, int]], *_: Any) -> None:
+    """Find the sets of a tile's own nodes and quads."""
+    path = job.path("sets", t)
+    if path.exists():
+        return
+    others = [Ring(**load_arrays(job.path("ring", other))) for other in job.grid.around(t) if other != t]
+    first = first_numbers(counts)
+    own_nodes, first_quad = range(first[t], first[t + 1]), sum(quads for _, quads in counts[:t])
+    box = np.array([(0.0, 0.0), job.grid.shape[::-1]])
+    save_arrays(path, **as_arrays(tile_sets(_numbered(job, t, counts), others, own_nodes, first_quad, box)))
+
+
+def elements(job: Job, counts: Sequence[tuple[int, int]], folder: Path) -> FEMesh:
+    """Return the elements of the whole picture in the unit of the options, of arrays that are mapped in a folder.
+
+    Raises
+    ------
+    InputError
+        There are no quads.
+    """
+    if not sum(quads for _, quads in counts):
+        raise InputError("the mesh has no quads: nothing to write; was every material dropped?")
+    mapped = Mapped(folder, COLUMNS)
+    for t in range(job.grid.n_tiles):
+        whole, is_own = _numbered(job, t, counts), load_arrays(job.path("own", t))["is_own"]
+        mapped.append(
+            points=whole.points[is_own] * job.options.pixel_sides + job.options.corner,
+            cells=whole.quads, cell_material=whole.label, cell_region=whole.region,
+            point_kind=load_arrays(job.path("sets", t))["kind"],
+        )  # fmt: skip
+    found = joined_sets(load_arrays(job.path("sets", t)) for t in range(job.grid.n_tiles))
+    return named_elements(mapped, found, job.rules().legend.materials)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from imgquad_core.arrays import Ints
 from imgquad_core.errors import InputError
 from imgquad_core.fe.femesh import FEMesh, Names
 from imgquad_core.whole_files import replacing
 
 ROWS_AT_ONCE = 20_000  # rows formatted in one go: a few MB of text in memory
+LOOKED_UP = 100_000  # elements whose nodes are in memory at a time
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Nodes of some elements: looked up part by part, as they may lie in a mapped file."""
+
+    of: Ints  #: nodes of all elements of a kind
+    ids: Ints | None = None  #: which of them; None: all
+
+    def __len__(self) -> int:
+        return len(self.of if self.ids is None else self.ids)
+
+    def parts(self) -> Iterator[Ints]:
+        """Yield the nodes of so many elements, and of the next ones."""
+        for start in range(0, len(self), LOOKED_UP):
+            part = slice(start, start + LOOKED_UP)
+            yield self.of[part] if self.ids is None else self.of[self.ids[part]]
 
 
 def write_text(path: str | Path, parts: Iterable[str]) -> None:
@@ -45,9 +65,11 @@ def real(value: float) -> str:
 
 def wrapped(ids: ArrayLike, per_line: int, separator: str = ", ") -> Iterator[str]:
     """Yield numbers, `per_line` to a line."""
-    values = list(map(str, np.asarray(ids).tolist()))
-    for start in range(0, len(values), per_line):
-        yield separator.join(values[start : start + per_line]) + "\n"
+    array = np.asarray(ids)
+    for begin in range(0, len(array), per_line * ROWS_AT_ONCE):
+        values = list(map(str, array[begin : begin + per_line * ROWS_AT_ONCE].tolist()))
+        for start in range(0, len(values), per_line):
+            yield separator.join(values[start : start + per_line]) + "\n"
 
 
 def safe_names(

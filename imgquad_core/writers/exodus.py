@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from imgquad_core.arrays import Ints
 from imgquad_core.fe.femesh import FEMesh
 from imgquad_core.whole_files import replacing
 
-from .common import refuse_six_nodes, safe_names
+from .common import LOOKED_UP, Nodes, refuse_six_nodes, safe_names
 
 NAME_LIMIT = 255
 ELEMENTS = {"tri3": "TRI3", "quad4": "QUAD4", "quad8": "QUAD8", "quad9": "QUAD9", "hex8": "HEX8"}
@@ -40,13 +42,14 @@ def write_exodus(mesh: FEMesh, path: str | Path) -> None:
     """
     refuse_six_nodes(mesh, "Exodus")
     with replacing(path) as temporary, scipy.io.netcdf_file(str(temporary), "w", version=2) as file:
-        _heading(file, mesh)
-        position = _blocks(file, mesh)
+        folder = temporary.parent.parent
+        _heading(file, mesh, folder)
+        position = _blocks(file, mesh, folder)
         _node_sets(file, mesh)
         _side_sets(file, mesh, position)
 
 
-def _heading(file: Any, mesh: FEMesh) -> None:
+def _heading(file: Any, mesh: FEMesh, folder: Path) -> None:
     file.api_version = file.version = np.float32(5.22)
     file.floating_point_word_size, file.file_size, file.maximum_name_length = 8, 1, NAME_LIMIT
     file.title = b"imgquad-mesh"
@@ -59,21 +62,24 @@ def _heading(file: Any, mesh: FEMesh) -> None:
     file.createDimension("num_elem", mesh.n_cells + len(mesh.cohesive))
     file.createVariable("time_whole", "d", ("time_step",))
     for axis in range(dimension):
-        _put(file, f"coord{'xyz'[axis]}", "d", ("num_nodes",), mesh.points[:, axis])
+        starts = range(0, mesh.n_points, LOOKED_UP)
+        values = _kept("d", (mesh.points[start : start + LOOKED_UP, axis] for start in starts), folder)
+        _put(file, f"coord{'xyz'[axis]}", "d", ("num_nodes",), values)
     _put_names(file, "coor_names", "num_dim", list("xyz"[:dimension]))
 
 
-def _blocks(file: Any, mesh: FEMesh) -> Ints:
+def _blocks(file: Any, mesh: FEMesh, folder: Path) -> Ints:
     """Write the blocks; return the place in the file of each element of `mesh`, from 1."""
-    cells = {name: (ids, mesh.cells[ids]) for name, ids in mesh.material_cells().items()}
+    cells = {name: (ids, Nodes(mesh.cells, ids)) for name, ids in mesh.material_cells().items()}
     for name, ids in mesh.cohesive_cells().items():
-        cells[name] = (mesh.n_cells + ids, mesh.cohesive[ids])
+        cells[name] = (mesh.n_cells + ids, Nodes(mesh.cohesive, ids))
     file.createDimension("num_el_blk", len(cells))
     _put_list(file, "eb", "num_el_blk", list(cells))
     for b, (ids, nodes) in enumerate(cells.values(), 1):
         file.createDimension(f"num_el_in_blk{b}", len(ids))
-        file.createDimension(f"num_nod_per_el{b}", nodes.shape[1])
-        connect = _put(file, f"connect{b}", "i", (f"num_el_in_blk{b}", f"num_nod_per_el{b}"), nodes + 1)
+        file.createDimension(f"num_nod_per_el{b}", nodes.of.shape[1])
+        values = _kept("i", (part + 1 for part in nodes.parts()), folder)
+        connect = _put(file, f"connect{b}", "i", (f"num_el_in_blk{b}", f"num_nod_per_el{b}"), values)
         is_cohesive = len(ids) and ids[0] >= mesh.n_cells
         connect.elem_type = (
             ("HEX8" if mesh.dimension == 3 else "QUAD4") if is_cohesive else ELEMENTS[mesh.kind]
@@ -117,6 +123,16 @@ def _put_list(file: Any, prefix: str, dimension: str, names: list[str]) -> None:
 def _put_names(file: Any, name: str, dimension: str, texts: list[str]) -> None:
     table = np.array([text.encode().ljust(NAME_LIMIT + 1, b"\0") for text in texts], f"S{NAME_LIMIT + 1}")
     _put(file, name, "c", (dimension, "len_name"), table.view("S1").reshape(len(texts), -1))
+
+
+def _kept(kind: str, parts: Iterable[NDArray[Any]], folder: Path) -> NDArray[Any]:
+    """Keep the values of a variable in a file without a name until SciPy writes all variables at the end."""
+    dtype = np.dtype(kind).newbyteorder(">")
+    with tempfile.TemporaryFile(dir=folder) as stream:
+        for part in parts:
+            stream.write(part.astype(dtype).tobytes())
+        stream.flush()
+        return np.memmap(stream, dtype, "r")
 
 
 def _put(file: Any, name: str, kind: str, dimensions: tuple[str, ...], values: NDArray[Any]) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from inspect import Parameter, signature
 from pathlib import Path
 from types import MappingProxyType
@@ -72,6 +72,14 @@ def options_of(writer: Writer) -> tuple[str, ...]:
     return tuple(p.name for p in signature(writer).parameters.values() if p.kind is Parameter.KEYWORD_ONLY)
 
 
+def check_options(path: str | Path, options: Iterable[str]) -> None:
+    """Raise `InputError` where the writer of the extension of `path` does not have an option."""
+    known = options_of(writer_for(path))
+    for name in options:
+        if name not in known:
+            raise InputError(f"{Path(path).suffix} has no option '{name}'; options: {', '.join(known) or 'none'}")
+
+
 def write_mesh(mesh: QuadMesh | FEMesh, path: str | Path, **options: Any) -> None:
     """Write `mesh` in the format of the extension of `path`.
 
@@ -89,9 +97,5 @@ def write_mesh(mesh: QuadMesh | FEMesh, path: str | Path, **options: Any) -> Non
     InputError
         No such format, no such option, or the format cannot hold the mesh.
     """
-    writer = writer_for(path)
-    for name in options:
-        if name not in options_of(writer):
-            known = ", ".join(options_of(writer)) or "none"
-            raise InputError(f"{Path(path).suffix} has no option '{name}'; options: {known}")
-    writer(fe_mesh(mesh) if isinstance(mesh, QuadMesh) else mesh, path, **options)
+    check_options(path, options)
+    writer_for(path)(fe_mesh(mesh) if isinstance(mesh, QuadMesh) else mesh, path, **options)

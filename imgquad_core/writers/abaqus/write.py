@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -110,15 +111,15 @@ def write_abaqus(
         safe_names(mesh.node_sets, NAME_LIMIT, reserved=("NALL", *driver_names(mesh).values()), upper=True),
         safe_names([f"S_{name}" for name in mesh.side_sets], NAME_LIMIT, upper=True),
     )
-    parts = [*_head(mesh, element), *_sets(mesh, sets, labels), *_sections(mesh, sections, labels, thickness)]
+    parts = [_head(mesh, element), _sets(mesh, sets, labels), _sections(mesh, sections, labels, thickness)]
     if len(mesh.cohesive):
         chosen_form = interfaces or ("springs" if deck else "elements")
-        parts += interface_text(mesh, labels.elements, values, thickness, chosen_form)
+        parts.append(interface_text(mesh, labels.elements, values, thickness, chosen_form))
     if mesh.periodic:
-        parts += equation_text(mesh, heat="heat" in chosen or deck == "thermal")
+        parts.append(equation_text(mesh, heat="heat" in chosen or deck == "thermal"))
     if deck is not None:
-        parts += deck_text(mesh, deck, values, labels.elements, labels.nodes)
-    write_text(path, parts)
+        parts.append(deck_text(mesh, deck, values, labels.elements, labels.nodes))
+    write_text(path, chain.from_iterable(parts))
 
 
 def element_type(mesh: FEMesh, analysis: str, reduced: bool) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from imgquad_mesh import large, outputs
 from imgquad_mesh.progress import counting_if
 
+from .element_options import add_writer_options, given_options
 from .mesh_options import add_mesh_options, mesh_options
 from .workers import add_workers, work_options
 
@@ -27,14 +28,19 @@ def add_parser(subparsers: Any) -> None:
         "--keep-whole", type=int, default=256, metavar="N", help="regions in a box of this side are never cut (256)"
     )
     group.add_argument("--format", choices=("pvtu", "vtkhdf"), default="pvtu", help="how the whole is written (pvtu)")
-    group.add_argument("--deck", type=Path, metavar="FILE", help="the whole for a solver: .inp .msh .e ...")
     add_workers(parser, group)
+    group = parser.add_argument_group("one file for a solver")
+    group.add_argument(
+        "--deck", dest="deck_file", type=Path, metavar="FILE", help="the whole with all sets: .inp .msh .e ..."
+    )
+    add_writer_options(group, "--load")
     parser.set_defaults(execute=execute)
 
 
 def execute(args: argparse.Namespace) -> int:
     """Mesh the picture that `args` names; return the exit code."""
-    outputs.check_files([args.image], [args.deck])
+    outputs.check_files([args.image], [args.deck_file])
+    deck_options = given_options(args, args.deck_file.suffix.lower() if args.deck_file else "", "--load")
     kinds = ("labels", "outlines", "mesh", "band", "piece")
     with counting_if(not args.quiet, dict.fromkeys(kinds)) as told:
         made = large.mesh_tiles(
@@ -44,7 +50,8 @@ def execute(args: argparse.Namespace) -> int:
             tile=args.tile,
             keep_whole=args.keep_whole,
             form=args.format,
-            deck=args.deck,
+            deck=args.deck_file,
+            deck_options=deck_options,
             told=told,
             **work_options(args),
         )
@@ -69,3 +76,5 @@ def _print(made: large.TiledMesh) -> None:
         f"mean {quality['mean_sj']:.3f}; irregular inner nodes {quality['irregular']:.2%}"
     )
     print(f"wrote {made.path}, report in {made.path.parent / 'report.json'}")
+    if "deck" in report:
+        print(f"wrote {report['deck']}")

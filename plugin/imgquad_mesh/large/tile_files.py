@@ -12,6 +12,7 @@ import numpy as np
 from imgquad_core.errors import InputError
 from imgquad_core.model import Materials
 from imgquad_core.tiles import Job
+from imgquad_core.tiles.numbering import first_numbers
 from imgquad_core.tiles.tasks import final_mesh, node_numbers
 from imgquad_core.whole_files import replacing
 from imgquad_mesh import datasets, outputs
@@ -42,11 +43,6 @@ def _save_piece(job: Job, t: int, found: dict[str, Any], counts: Sequence[tuple[
     datasets.put_materials(grid, job.rules().legend.materials)
     grid.set_active_scalars("material", preference="cell")
     outputs.replace_file(path, lambda temporary: outputs.save_dataset(grid, temporary))
-
-
-def first_numbers(counts: Sequence[tuple[int, int]]) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Return the number of each tile's first own node."""
-    return np.concatenate([[0], np.cumsum([own for own, _ in counts])]).astype(np.int64)
 
 
 def _placed(job: Job, points: Any) -> Any:

@@ -22,6 +22,7 @@ from imgquad_core.tiles.meshes import TileMesh, welded
 from imgquad_mesh import outputs
 
 from .cluster import opened, run_steps
+from .decks import Deck
 from .graph import Failed, Result, Step, Told, as_delayed, call
 from .plan import digest_of_text, options_as_json, start_plan
 from .tile_files import write_collected, write_piece
@@ -109,6 +110,7 @@ def mesh_tiles(
     keep_whole: int = 256,
     form: str = "pvtu",
     deck: str | Path | None = None,
+    deck_options: Mapping[str, Any] | None = None,
     workers: int = 1,
     scheduler: str | None = None,
     client: Any = None,
@@ -134,7 +136,10 @@ def mesh_tiles(
     form : "pvtu" or "vtkhdf"
         How the whole is written.
     deck : path, optional
-        File for a solver, of the whole mesh, in a format that its extension names; made in this process's memory.
+        File for a solver, of the whole mesh with all sets, in a format that its extension names. It can be asked for
+        when the mesh is there already.
+    deck_options : mapping, optional
+        Of its writer, as of `imgquad_core.writers.write_abaqus`.
     workers, scheduler, client, restart, compute, told
         As for `mesh_stack`.
 
@@ -152,7 +157,8 @@ def mesh_tiles(
     The mesh hangs on the picture, the options and the grid (`tile`, `keep_whole`), not on the workers.
     """
     folder, options = Path(output), options or MeshOptions()
-    _check(options, form, deck)
+    made_for = Deck.of(deck, deck_options)
+    _check(options, form)
     keep = int(keep_whole)
     plan = {
         "what": "tiles",
@@ -164,9 +170,10 @@ def mesh_tiles(
     }
     start_plan(folder, plan, restart)
     job, stored = _job_of(source, folder, options, tile, keep)
-    steps = list(_steps(job, stored, form))
+    steps = [*_steps(job, stored, form), *(_set_steps(job) if made_for and made_for.is_mapped else ())]
     rows, pieces = ([Result(f"{kind}-{t}") for t in range(job.grid.n_tiles)] for kind in ("finish", "piece"))
-    end = Step("end", _finished, (job, rows, pieces, form, deck))
+    needs = [Result(step.key) for step in steps if step.key.startswith("sets-")]
+    end = Step("end", _finished, (job, rows, pieces, form, made_for, Result("counts"), needs))
     if not compute:
         return as_delayed([*steps, end])[end.key]
     with opened(workers, scheduler, client) as used:
@@ -175,7 +182,7 @@ def mesh_tiles(
     return call(end, done)
 
 
-def _check(options: MeshOptions, form: str, deck: str | Path | None) -> None:
+def _check(options: MeshOptions, form: str) -> None:
     """Refuse what only a picture as a whole can be given, before any work is done."""
     if form not in FORMATS:
         raise InputError(f"format is {form}: give {' or '.join(FORMATS)}")
@@ -191,8 +198,6 @@ def _check(options: MeshOptions, form: str, deck: str | Path | None) -> None:
     sides = options.pixel_sides
     if sides[0] != sides[1]:
         raise InputError(f"pixel_size is {sides}, but tiles need square pixels: resample the picture")
-    if deck is not None:
-        outputs.check_target(Path(deck), outputs.mesh_extensions())
 
 
 def _named(source: Any) -> Any:
@@ -214,7 +219,7 @@ def _job_of(source: Any, folder: Path, options: MeshOptions, tile: int, keep: in
     inside.mkdir(exist_ok=True)
     found, stored = _source_of(source, inside, options)
     placed = options.placed(found.calibration, found.name)
-    _check(placed, FORMATS[0], None)
+    _check(placed, FORMATS[0])
     return Job(str(inside), found, grid_of(found.shape, tile, keep, work.largest_size(options)), placed), stored
 
 
@@ -272,6 +277,15 @@ def _steps(job: Job, stored: Any, form: str) -> Iterator[Step]:
         yield Step(f"piece-{t}", Guarded(write_piece), (job, t, Result("counts"), form))
 
 
+def _set_steps(job: Job) -> Iterator[Step]:
+    """Give the steps that find all sets for a solver's file."""
+    for t in range(job.grid.n_tiles):
+        yield Step(f"ring-{t}", Guarded(work.ring), (job, t, Result("counts")))
+    for t in range(job.grid.n_tiles):
+        rings = [Result(f"ring-{other}") for other in job.grid.around(t)]
+        yield Step(f"sets-{t}", Guarded(work.sets), (job, t, Result("counts"), rings))
+
+
 def _band_steps(job: Job) -> Iterator[Step]:
     for k, kind in enumerate(ROUNDS):
         for group in groups_of(job.grid, kind):
@@ -325,7 +339,13 @@ def _assert_done(job: Job, steps: Sequence[Step], done: Mapping[str, Any]) -> No
 
 
 def _finished(
-    job: Job, rows: Sequence[Mapping[str, Any]], pieces: Sequence[Any], form: str, deck: str | Path | None
+    job: Job,
+    rows: Sequence[Mapping[str, Any]],
+    pieces: Sequence[Any],
+    form: str,
+    deck: Deck | None,
+    counts: Sequence[tuple[int, int]],
+    _sets: Sequence[Any],
 ) -> TiledMesh:
     """Write what shows the whole, the report, and the deck."""
     folder = Path(job.folder).parent
@@ -334,7 +354,7 @@ def _finished(
     write_collected(job, pieces, path)
     made = TiledMesh(path, report, job)
     if deck is not None:
-        outputs.write_mesh_file(made.mesh(), Path(deck))
-        report["deck"] = str(deck)
+        deck.write(job, counts, made.mesh)
+        report["deck"] = str(deck.path)
     outputs.write_json(report, folder / "report.json")
     return made

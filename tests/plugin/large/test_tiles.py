@@ -13,13 +13,18 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+import imgquad_core as core
 from imgquad_core import MeshOptions
 from imgquad_core.errors import InputError
+from imgquad_core.fe import FEMesh, fe_mesh
+from imgquad_core.fe.sets import BORDERS
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.tiles import tasks
+from imgquad_core.writers import safe_names, write_mesh
 from imgquad_mesh.__main__ import main
 from imgquad_mesh.datasets.field_texts import texts_of
 from imgquad_mesh.large import TiledMesh, mesh_tiles
+from support.ccx import needs_ccx, solve
 from support.invariants import assert_valid_mesh
 from support.labels import label_image
 
@@ -56,6 +61,17 @@ def made(picture: Path) -> TiledMesh:
 
 def meshed(source: Any, folder: Path, **options: Any) -> Any:
     return mesh_tiles(source, folder, options.pop("how", OPTIONS), tile=TILE, keep_whole=KEEP, **options)
+
+
+def other_way_round(name: str) -> str:
+    """interface_B_A of interface_A_B, for names of materials with a blank."""
+    _, first, second = name.split("_")
+    return f"interface_{second}_{first}"
+
+
+def length(mesh: FEMesh, name: str) -> float:
+    ends = mesh.points[mesh.side_nodes(mesh.side_sets[name])]
+    return float(np.hypot(*(ends[:, 1] - ends[:, 0]).T).sum())
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -208,6 +224,72 @@ def test_command_writes_partitions_and_a_deck(
     read = meshio.read(deck)
     assert len(read.cells_dict["quad"]) == report["quality"]["n_quads"]
     assert {"left", "right", "top", "bottom"} <= {name.lower() for name in read.point_sets}
+
+
+@pytest.mark.parametrize("name", ["whole.inp", "whole.msh", "whole.e"])
+def test_a_deck_from_the_tiles_is_that_of_the_whole(name: str, picture: Path, made: TiledMesh, tmp_path: Path) -> None:
+    """With all sets, to the byte, though no process had more than one tile and its rim; nothing is meshed anew."""
+    work = made.path.parent / "work"
+    before = {path.name: path.stat().st_mtime_ns for path in work.glob("final-*.npz")}
+    meshed(picture, made.path.parent, deck=tmp_path / name)
+    assert {path.name: path.stat().st_mtime_ns for path in work.glob("final-*.npz")} == before
+    write_mesh(made.mesh(), tmp_path / f"memory-{name}")
+    assert (tmp_path / name).read_bytes() == (tmp_path / f"memory-{name}").read_bytes()
+    assert not list(work.glob(".imgquad-*"))  # what was mapped is gone
+
+
+def test_sets_of_parts_that_were_dropped(tmp_path: Path) -> None:
+    """Tiles without quads, and a side of the mesh that is on no border of the picture."""
+    labels = drawn_labels()
+    labels[:, 400:] = 9
+    how = MeshOptions(size=4.0, drop=(9,), pixel_size=0.25, origin=(3.0, -2.0))
+    made = meshed(labels, tmp_path / "out", how=how, deck=tmp_path / "whole.inp")
+    counts = [tasks.number(made.job, t) for t in range(made.job.grid.n_tiles)]
+    assert counts[2] == (0, 0)
+    found, alone = tasks.elements(made.job, counts, tmp_path), fe_mesh(core.run(labels, how).mesh)
+    assert set(found.side_sets) == set(alone.side_sets)
+    assert set(found.node_sets) == set(alone.node_sets)
+    assert set(found.element_sets) == set(alone.element_sets)
+    assert "right" not in found.side_sets
+    for name in ("left", "top", "bottom"):
+        assert length(found, name) == pytest.approx(length(alone, name))
+    assert length(found, "free_material 0") == pytest.approx(length(alone, "free_material 0"), rel=0.01)
+
+
+@needs_ccx
+def test_calculix_solves_the_deck_of_a_picture_in_tiles(picture: Path, made: TiledMesh, tmp_path: Path) -> None:
+    """One stiffness everywhere: the pull on the right side is that of a plate."""
+    values = {"*": {"young": 1000.0, "poisson": 0.0}}
+    deck = tmp_path / "pull.inp"
+    meshed(picture, made.path.parent, deck=deck, deck_options={"properties": values, "deck": "tension"})
+    force = solve(deck)["total force"][0, 0]
+    assert force == pytest.approx(1000.0 * 1e-3 * SHAPE[0], rel=1e-6)
+
+
+def test_gmsh_reads_all_names_of_a_picture_in_tiles(picture: Path, made: TiledMesh, tmp_path: Path) -> None:
+    gmsh = pytest.importorskip("gmsh")
+    meshed(picture, made.path.parent, deck=tmp_path / "whole.msh")
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(tmp_path / "whole.msh"))
+        names = {gmsh.model.getPhysicalName(*group) for group in gmsh.model.getPhysicalGroups()}
+        n_quads = sum(len(gmsh.model.mesh.getElementsByType(3, tag)[0]) for _, tag in gmsh.model.getEntities(2))
+    finally:
+        gmsh.finalize()
+    whole = fe_mesh(made.mesh())
+    corners = {name for name in whole.node_sets if name.startswith("corner_")}
+    sides = {name for name in whole.side_sets if name in BORDERS or name <= other_way_round(name)}
+    assert names == set(safe_names({*whole.material_cells(), *sides, *corners}, 127).values())
+    assert n_quads == made.report["quality"]["n_quads"]
+
+
+def test_options_of_decks_are_checked_before_any_work(picture: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.msh has no option 'thickness'"):
+        meshed(picture, tmp_path / "out", deck=tmp_path / "a.msh", deck_options={"thickness": 2.0})
+    with pytest.raises(InputError, match="none is asked for"):
+        meshed(picture, tmp_path / "out", deck_options={"thickness": 2.0})
+    assert not (tmp_path / "out").exists()
 
 
 def test_memory_that_does_not_do_is_told_with_the_tile_and_what_fits(
