@@ -91,7 +91,7 @@ def _split(graph: BoundaryGraph, split: Flags) -> BoundaryGraph:
     n, chain = len(graph.points), chain_of_places(graph)
     split = split.copy()
     split[offsets[1:] - 1] = False  # no edge behind the last point of a chain
-    is_held = graph.point_kind[ids] == PointKind.HELD
+    is_held = graph.point_kind[ids] >= PointKind.HELD
     split &= ~is_held & ~np.roll(is_held, -1)
     at = np.flatnonzero(split)
     new = n + np.arange(len(at))

@@ -28,6 +28,7 @@ class PointKind(IntEnum):
     CORNER = 3  #: a corner of the picture or a sharp corner of a chain: stays
     INTERIOR = 4  #: of a mesh only, on no chain: moves freely
     HELD = 5  #: inside a chain that somebody else meshes up to, too: stays, and its edges are not cut
+    SEAM = 6  #: the same, of a chain that will be gone: poor elements there are mended then
 
 
 @dataclass(frozen=True, eq=False)

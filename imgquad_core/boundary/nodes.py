@@ -271,10 +271,15 @@ def mark_conflicts(
     """
     marks = find_conflicts(points, strided.segments, strided.chain, is_new, shape, units)
     if gently:
-        mark_sharp(points, strided.chain_points, strided.offsets, ends.offsets, ends.sockets, _LEAST_SECTOR, marks)
+        mark_sectors(points, strided, ends, marks)
     else:
         marks[marks < CROSSING] = 0
     return marks
+
+
+def mark_sectors(points: Floats, strided: Strided, ends: Ends, marks: Bytes) -> None:
+    """Mark the segments on both sides of sectors that are too sharp, in place."""
+    mark_sharp(points, strided.chain_points, strided.offsets, ends.offsets, ends.sockets, _LEAST_SECTOR, marks)
 
 
 def any_of_chain(flags: Flags, offsets: Ints) -> Flags:

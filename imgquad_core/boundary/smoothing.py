@@ -29,6 +29,7 @@ from .nodes import Nodes
 from .oblong_pixels import stretch
 from .options import SmoothingOptions
 from .pores import pores_of
+from .seams import Real, lay_seams, moved_areas, without_seams
 from .sharp_corners import beside_corners, find_corners, place_corners
 from .stairs import Step, as_step, find_step, in_data_points
 from .withdrawal import Draft, place_freely, restore_areas_freely
@@ -36,6 +37,7 @@ from .withdrawal import Draft, place_freely, restore_areas_freely
 _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign points that both move it cannot meet
 _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for areas
 _NARROW = 2.0  # px; least reach of the local feature size that bounds shifts
+SEAM_ROOM = 1.5  # of the size asked for: seams keep it from boundaries, so that elements fit between
 _ARC_RATIO = 2.0  # arc over distance of a foreign point of the pixel boundary
 
 
@@ -76,8 +78,9 @@ def smooth_chains(
     options: SmoothingOptions,
     shape: tuple[int, int] | None = None,
     barred: Flags | None = None,
+    seams: Flags | None = None,
 ) -> Smoothed:
-    """Do what `smooth_boundaries` does; `barred` chains are not joined, however short."""
+    """Do what `smooth_boundaries` does; `barred` chains are not joined, however short, `seams` move no others."""
     step = find_step(graph) if options.step == "auto" else as_step(options.step)
     true, threads = _TrueShape.of(graph.shape, shape, step), threads_of(options.threads)
     pores = pores_of(graph)
@@ -88,29 +91,26 @@ def smooth_chains(
         true = _TrueShape.of(graph.shape, shape, (step[0] * width, step[1] * width))
     curves, ends = curves_of(*chains)
     curves, is_corner = find_corners(curves, threads)
-    room = _room(curves, is_corner, options.max_shift, threads)
-    node = place_junctions(curves, ends, room, chains.graph.shape)
+    is_seam = np.zeros(len(which), bool) if seams is None else seams[which]
+    real = without_seams(curves, ends, is_seam)
+    room = np.zeros(len(curves.raw))
+    room[real.kept] = _room(real.curves, is_corner[real.kept], options.max_shift, threads)
+    node = place_junctions(curves, real.ends, room, chains.graph.shape)
     smooth = _smooth(curves, node, is_corner, room, threads)
+    lay_seams(smooth, curves, is_seam, SEAM_ROOM * options.size / true.unit)
     if true.extent != chains.graph.shape:
         curves, ends, node, smooth = stretch(curves, ends, node, smooth, chains.graph.shape, true.extent)
+        real = without_seams(curves, ends, is_seam)
     limit = per_point(curves, _asked_sizes(chains.graph, curves.is_frame, options) / true.unit)
     draft = Draft(
-        curves,
-        ends,
-        smooth,
-        node,
-        is_corner,
-        limit,
-        options.edge_ratio,
-        options.edge_multiple,
-        true.extent,
-        true.grid,
-    )
-    size = edge_sizes(smooth, curves, limit, is_corner, options.growth, options.edge_ratio, true.extent, threads)
-    nodes, gently = place_freely(draft, size)
+        curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.edge_multiple, true.extent,
+        true.grid, is_seam, real.ends,
+    )  # fmt: skip
+    nodes, gently = place_freely(draft, _wanted_sizes(draft, real, options.growth, threads))
     areas = np.append(graph.region_pixels, pores.pixels) * true.pixel
     sides = pores.sides[which]
-    nodes = restore_areas_freely(sides, areas / true.unit**2, draft, nodes, room, options.max_shift, gently)
+    areas = areas / true.unit**2 + moved_areas(smooth, curves, is_seam, sides, len(areas))
+    nodes = restore_areas_freely(sides, areas, draft, nodes, room, options.max_shift, gently)
     nodes = nodes._replace(points=snapped(nodes.points * true.unit))
     pixels = np.maximum(np.rint(graph.region_pixels * true.pixel), 1).astype(np.int64)
     return Smoothed(_graph(replace(chains.graph, shape=true.shape, region_pixels=pixels), draft, nodes), which)
@@ -161,6 +161,16 @@ def _asked_sizes(graph: BoundaryGraph, is_frame: Flags, options: SmoothingOption
     for pair, size in (options.sizes_between or {}).items():
         asked[(beside == sorted(pair)).all(axis=1)] = size
     return np.asarray(asked)
+
+
+def _wanted_sizes(draft: Draft, real: Real, growth: float, threads: int) -> Floats:
+    """Return the wanted length of edges; of seams it is the asked one."""
+    size, kept = draft.limit.copy(), real.kept
+    size[kept] = edge_sizes(
+        draft.smooth[kept], real.curves, draft.limit[kept], draft.is_corner[kept], growth, draft.edge_ratio,
+        draft.shape, threads,
+    )  # fmt: skip
+    return size
 
 
 def _room(curves: Curves, is_corner: Flags, max_shift: float, threads: int) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.chains import places_of
 from imgquad_core.errors import TopologyError
-from imgquad_core.geometry.conflicts import CROSSING, FREE, SHARP, UNITS, snapped
+from imgquad_core.geometry.conflicts import CROSSING, FREE, SHARP, UNITS, find_conflicts, snapped
 from imgquad_core.model import Chains
 
 from .areas import mitres, restore_areas
@@ -26,6 +26,7 @@ from .nodes import (
     any_of_chain,
     even_out,
     mark_conflicts,
+    mark_sectors,
     number_nodes,
     on_stride,
     place_nodes,
@@ -66,6 +67,21 @@ class Draft(NamedTuple):
     edge_multiple: int  #: very long pieces get a multiple of this many final edges
     shape: tuple[float, float]
     units: float = UNITS  #: steps of the grid on which coordinates are exact, a unit of length
+    is_seam: Flags | None = None  #: (n_chains,) chains that others must not cross, and no more; None: there are none
+    real_ends: Ends | None = None  #: the ends without these
+
+    def marks(self, points: Floats, strided: Strided, is_new: Flags, gently: bool) -> Bytes:
+        """Mark the segments of a strided that are in conflict."""
+        if self.is_seam is None or self.real_ends is None or not self.is_seam.any():
+            return mark_conflicts(points, strided, self.ends, is_new, gently, self.shape, self.units)
+        marks = mark_conflicts(points, strided, self.ends, is_new, False, self.shape, self.units)
+        if gently:
+            real = ~self.is_seam[strided.chain]
+            part = strided._replace(segments=strided.segments[real], chain=strided.chain[real])
+            found = find_conflicts(points, part.segments, part.chain, is_new, self.shape, self.units)
+            marks[real] = np.maximum(marks[real], found)
+            mark_sectors(points, strided, self.real_ends, marks)
+        return marks
 
 
 def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> tuple[Nodes, bool]:
@@ -96,7 +112,7 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         nodes = _place(draft, size, at_least, exact, withdrawn)
         factor, pull = np.ones(len(size)), np.zeros(len(size))
         for strided in (on_stride(nodes, 2), on_stride(nodes, 1)):
-            marks = mark_conflicts(nodes.points, strided, draft.ends, is_new, gently, draft.shape, draft.units)
+            marks = draft.marks(nodes.points, strided, is_new, gently)
             _mark_dense(marks, strided, curves.offsets, attempt >= patience.closer, factor, pull)
         if factor.min() == 1.0:
             return nodes, gently
@@ -204,7 +220,7 @@ def restore_areas_freely(
         has_moved |= had_conflicts
         is_bad = np.zeros(len(points), bool)
         for strided, is_excused in both:
-            marks = mark_conflicts(points, strided, draft.ends, has_moved, True, draft.shape, draft.units)
+            marks = draft.marks(points, strided, has_moved, True)
             is_bad[strided.segments[marks > np.where(is_excused, CROSSING - 1, FREE)]] = True
         if not is_bad.any():
             return nodes._replace(points=points)
@@ -218,7 +234,7 @@ def _excused(draft: Draft, nodes: Nodes, strided: Strided, gently: bool) -> Flag
     if gently:
         return np.zeros(len(strided.segments), bool)
     all_chains = np.ones(len(draft.curves.ends), bool)
-    return np.asarray(mark_conflicts(nodes.points, strided, draft.ends, all_chains, True, draft.shape, draft.units) > 0)
+    return np.asarray(draft.marks(nodes.points, strided, all_chains, True) > 0)
 
 
 def _widened(flags: Flags) -> Flags:

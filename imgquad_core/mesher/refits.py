@@ -15,7 +15,7 @@ from imgquad_core.model import BoundaryGraph
 
 from .efforts import Tuning
 from .options import MeshingOptions
-from .strides import Meshed, consistent, faces_beside, faces_of, mesh_faces
+from .strides import Meshed, consistent, faces_beside, faces_of, judged, mesh_faces
 
 PATIENCE = 6  # rounds that reach no farther than the edges beside the quads
 
@@ -30,7 +30,7 @@ class State(NamedTuple):
 def with_wishes(state: State, options: MeshingOptions) -> State:
     """Halve edges beside poor quads; what gets better by that is kept."""
     for attempt in range(options.tuning.wishes):
-        poor = poor_rim(state.meshed, options.tuning.worst)
+        poor = poor_rim(state, options.tuning.worst)
         if len(poor) == 0:
             break
         try:
@@ -51,11 +51,11 @@ def with_musts(state: State, options: MeshingOptions) -> State:
         Quads stay folded.
     """
     for attempt in range(options.tuning.wishes, options.tuning.rounds):
-        folded = poor_rim(state.meshed, 0.0)
+        folded = poor_rim(state, 0.0)
         if len(folded) == 0:
             break
         state = _refitted(state, _finer(state.graph, folded, attempt, options.tuning), options)
-    if (folded := poor_rim(state.meshed, 0.0)).size:
+    if (folded := poor_rim(state, 0.0)).size:
         where = state.graph.points[folded[0]].tolist()
         raise TopologyError(f"{len(folded)} boundary points fold quads, the first at {where}")
     return state
@@ -103,10 +103,11 @@ def _finer(graph: BoundaryGraph, poor: Ints, attempt: int, tuning: Tuning) -> Bo
     return refined(graph, poor, attempt if attempt < tuning.wishes else 2 ** max(attempt - PATIENCE, 0) - 1)
 
 
-def poor_rim(meshed: Meshed, limit: float) -> Ints:
+def poor_rim(state: State, limit: float) -> Ints:
     """Return the boundary points of quads not above `limit`, and all those of a face whose such quads have none."""
-    found = [np.empty(0, np.int64)]
-    for part in meshed.parts if (meshed.worst <= limit).any() else ():
+    found, meshed = [np.empty(0, np.int64)], state.meshed
+    for whole in meshed.parts if (meshed.worst <= limit).any() else ():
+        part = judged(whole, state.graph)
         looked_at = np.flatnonzero(meshed.worst[part.face] <= limit)
         poor = looked_at[scaled_jacobian(part.points, part.quads[looked_at]) <= limit]
         origin = part.origin[part.quads[poor]]

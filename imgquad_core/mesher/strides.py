@@ -17,7 +17,8 @@ from imgquad_core.cleanup.faces import FaceQuads, faces_only
 from imgquad_core.cleanup.options import CleanUp
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.quad_shape import lower_to_worst
-from imgquad_core.model import BoundaryGraph
+from imgquad_core.measures.quality import scaled_jacobian
+from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.threads import in_threads
 
 from .composing import compose
@@ -143,8 +144,19 @@ def _mesh_at_stride(
     batches = [batch for group in composed for batch in group]
     task = Task(graph.points, stride // 2, table, how, options.n_threads, portions)
     parts = finished(batches, task, progress.finished if progress else None)
-    in_threads(parts, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.n_threads)
+    told = [judged(part, graph) for part in parts]
+    in_threads(told, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.n_threads)
     return Meshed(parts, faces, worst)
+
+
+def judged(part: FaceQuads, graph: BoundaryGraph) -> FaceQuads:
+    """Return the quads that tell how good faces are: all but valid ones at seams, which are mended later."""
+    is_seam = graph.point_kind == PointKind.SEAM
+    if not is_seam.any():
+        return part
+    at_seam = (is_seam[np.maximum(part.origin, 0)] & (part.origin >= 0))[part.quads].any(axis=1)
+    left_out = at_seam & (scaled_jacobian(part.points, part.quads) > 0.0)
+    return part._replace(quads=part.quads[~left_out], face=part.face[~left_out])
 
 
 def _groups_of(graph: BoundaryGraph, faces: Flags, sizes: Floats) -> list[Flags]:

@@ -94,7 +94,7 @@ def _own_sets(found: FoundSets, n_quads: int, first_quad: int, node: Ints, is_ow
     """Return what sets have of a tile's own nodes and quads; its own quads are the first ones."""
 
     def nodes(ids: Ints) -> Ints:
-        return node[ids[is_own[ids]]]
+        return np.asarray(node[ids[is_own[ids]]])
 
     def cells(ids: Ints) -> Ints:
         return ids[ids < n_quads] + first_quad
@@ -137,7 +137,7 @@ def joined_sets(tiles: Iterable[Mapping[str, NDArray[Any]]]) -> FoundSets:
 class Mapped:
     """Arrays that are written part by part to files and then read as if they were in memory."""
 
-    def __init__(self, folder: Path, columns: Mapping[str, tuple[type, int]]) -> None:
+    def __init__(self, folder: Path, columns: Mapping[str, tuple[str, int]]) -> None:
         self._columns = columns
         self._paths = {name: folder / f"{name}.bin" for name in columns}
         self._streams = {name: path.open("wb") for name, path in self._paths.items()}
@@ -147,9 +147,9 @@ class Mapped:
         for name, part in parts.items():
             self._streams[name].write(np.ascontiguousarray(part, self._columns[name][0]).data)
 
-    def arrays(self) -> dict[str, NDArray[Any]]:
+    def arrays(self) -> dict[str, Any]:
         """Return the arrays, mapped; nothing can be added any more."""
-        found = {}
+        found: dict[str, Any] = {}
         for name, (dtype, width) in self._columns.items():
             self._streams[name].close()
             found[name] = np.memmap(self._paths[name], dtype, "r")
@@ -158,8 +158,9 @@ class Mapped:
         return found
 
 
-COLUMNS = {"points": (np.float64, 2), "cells": (np.int64, 4), "cell_material": (np.int32, 1),
-           "cell_region": (np.int64, 1), "point_kind": (np.uint8, 1)}  # fmt: skip
+#: type and width of each array
+COLUMNS = {"points": ("f8", 2), "cells": ("i8", 4), "cell_material": ("i4", 1), "cell_region": ("i8", 1),
+           "point_kind": ("u1", 1)}  # fmt: skip
 
 
 def named_elements(mapped: Mapped, sets: FoundSets, materials: Materials) -> FEMesh:

@@ -73,9 +73,10 @@ def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: Meshing
 
 
 def _wished(mesh: QuadMesh, worst: float) -> Flags:
-    """Tell the held chains with a quad that is worse than that beside them."""
-    poor = np.zeros(mesh.n_points, bool)
-    poor[mesh.quads[scaled_jacobian(mesh.points, mesh.quads) <= worst]] = True
+    """Tell the held chains with a quad that is worse than that beside them, those at seams left out."""
+    is_seam, poor = mesh.point_kind == PointKind.SEAM, np.zeros(mesh.n_points, bool)
+    is_poor = scaled_jacobian(mesh.points, mesh.quads) <= worst
+    poor[mesh.quads[is_poor & ~is_seam[mesh.quads].any(axis=1)]] = True
     poor &= mesh.point_kind == PointKind.HELD
     return np.asarray(np.logical_or.reduceat(poor[mesh.chain_points], mesh.chain_offsets[:-1]))
 

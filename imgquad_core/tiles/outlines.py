@@ -21,9 +21,11 @@ from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
 from imgquad_core.boundary import ExtractionOptions, SmoothingOptions, extract_boundaries, smooth_chains
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, Materials, PointKind
 
+from .crossings import join_crossings
 from .grid import Box
 from .regions import Keys, Regions
 
+LONGEST = 16.0  #: px along a line of tiles that a boundary takes to cross it, at one node
 NOBODY = np.iinfo(np.int64).max  #: owner of what is not meshed
 
 
@@ -72,23 +74,26 @@ def outlines_of(
     extraction, smoothing
         Options of these stages.
     """
-    raw, key_of = _extracted(keys, regions, extraction)
-    owners = np.append(keys.tile[key_of], NOBODY)[raw.chain_regions]
+    pixels, key_of = _extracted(keys, regions, extraction)
+    owners = np.append(keys.tile[key_of], NOBODY)[pixels.chain_regions]
+    beside = np.append(keys.region[key_of], -1)[pixels.chain_regions]
+    is_seam = (beside[:, 0] == beside[:, 1]) & (owners[:, 0] != owners[:, 1])
+    raw, left = join_crossings(pixels, beside, owners, LONGEST)
+    owners, is_seam = owners[left], is_seam[left]
     ends = np.stack([raw.chain_points[raw.chain_offsets[:-1]], raw.chain_points[raw.chain_offsets[1:] - 1]], axis=1)
     low, high = _owners_at(raw, ends, owners)
-    smooth, which = smooth_chains(raw, smoothing, barred=(low != high)[ends].any(axis=1))
+    smooth, which = smooth_chains(raw, smoothing, barred=(low != high)[ends].any(axis=1), seams=is_seam)
     mine = (keys.tile[key_of] == t)[np.maximum(smooth.chain_regions, 0)] & (smooth.chain_regions >= 0)
     kept = np.flatnonzero(mine.any(axis=1))
     which, owners = which[kept], owners[which[kept]]
     faces = np.flatnonzero(keys.tile[key_of] == t)
     face = np.full(len(key_of) + 1, VOID, np.int64)
     face[faces] = np.arange(len(faces))
-    region = np.append(keys.region[key_of], -1)[raw.chain_regions[which]]
     shared = (owners[:, 0] != owners[:, 1]) & (owners != NOBODY).all(axis=1)
     offsets, ids, old = _compressed(smooth, kept)
     shift = np.array([window[0], n_rows - window[3]], float)
-    start = raw.chain_offsets[which]
-    key = np.hstack([_doubled(raw, window, raw.chain_points[start + k]) for k in (0, 1)])
+    start = pixels.chain_offsets[left[which]]
+    key = np.hstack([_doubled(pixels, window, pixels.chain_points[start + k]) for k in (0, 1)])
     at_ends = np.stack([ids[offsets[:-1]], ids[offsets[1:] - 1]], axis=1)
     fixed = np.isin(raw.point_kind, (PointKind.JUNCTION, PointKind.CORNER))
     closed = ~fixed[ends[which, 0]]
@@ -104,9 +109,9 @@ def outlines_of(
         owner=owners.min(axis=1),
         shared=shared,
         closed=closed,
-        seam=shared & (region[:, 0] == region[:, 1]),
+        seam=is_seam[which],
         key=key,
-        node=np.column_stack([here, low[origin], _doubled(raw, window, origin)]),
+        node=np.column_stack([here, low[origin], _doubled(pixels, window, origin)]),
         region=keys.region[key_of[faces]],
         label=np.asarray(raw.region_label[faces]),
         pixels=np.asarray(smooth.region_pixels[faces]),
@@ -192,7 +197,8 @@ def settled(
             new = n + np.arange(len(inner))
             n += len(inner)
             new_points.append(inner)
-            new_kind.append(np.where(inner_kind == PointKind.CORNER, PointKind.CORNER, PointKind.HELD).astype(np.uint8))
+            held = PointKind.SEAM if mine.seam[c] else PointKind.HELD
+            new_kind.append(np.where(inner_kind == PointKind.CORNER, PointKind.CORNER, held).astype(np.uint8))
             ids = np.append(new, new[:1]) if loop else np.concatenate([ids[:1], new, ids[-1:]])
         new_ids.append(ids)
         counts.append(len(ids))
