@@ -6,7 +6,16 @@ from .naming import as_told
 from .noise import Removal, automatic_limits, list_removed, remove_noise
 from .options import AbsorbOptions, DenoiseOptions, EditOptions, SegmentationOptions
 from .segmentation import Segmentation, segment_picture
-from .selection import Box, assert_solid, crop_image, drop_materials, material_number, sizes_by_number, sizes_by_numbers
+from .selection import (
+    Box,
+    assert_box,
+    assert_solid,
+    crop_image,
+    drop_materials,
+    material_number,
+    sizes_by_number,
+    sizes_by_numbers,
+)
 
 __all__ = [
     "AbsorbOptions",
@@ -24,6 +33,7 @@ __all__ = [
     "area_shares",
     "areas_of_origin",
     "as_told",
+    "assert_box",
     "assert_solid",
     "automatic_limits",
     "counts_labels",

@@ -55,14 +55,20 @@ def crop_image(image: LabelImage, box: Box) -> LabelImage:
         Left, upper, right and lower bound in pixels from the picture's upper left corner, as image viewers count; the
         columns ``left`` to ``right - 1`` and the rows ``upper`` to ``lower - 1`` stay.
     """
+    assert_box(box, image.shape)
     left, upper, right, lower = box
-    rows, cols = image.shape
+    return LabelImage(image.labels[upper:lower, left:right], image.materials)
+
+
+def assert_box(box: Box, shape: tuple[int, int]) -> None:
+    """Raise `InputError` where a box is no part of a picture of `shape` (n_rows, n_cols)."""
+    left, upper, right, lower = box
+    rows, cols = shape
     if not (0 <= left < right <= cols and 0 <= upper < lower <= rows):
         raise InputError(
             f"crop {left},{upper},{right},{lower} is not a box in a picture of {cols} x {rows} pixels: "
             f"give 0 <= X0 < X1 <= {cols} and 0 <= Y0 < Y1 <= {rows}, Y from the top"
         )
-    return LabelImage(image.labels[upper:lower, left:right], image.materials)
 
 
 def drop_materials(image: LabelImage, dropped: Iterable[str | int]) -> LabelImage:

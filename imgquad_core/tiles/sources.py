@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from imgquad_core.errors import InputError
+from imgquad_core.picture import assert_box
 from imgquad_core.reading import Calibration, Picture, ReadOptions, picture_of, read_picture
 from imgquad_core.reading.decoding import decoding, optional
 from imgquad_core.reading.picture import part_of
@@ -40,6 +41,8 @@ class Source:
         Level and channel.
     calibration : Calibration
         Pixel size and place, as far as the file knows them.
+    corner : tuple of int
+        Column and row in the file where the picture begins.
     """
 
     path: str
@@ -47,10 +50,20 @@ class Source:
     name: str
     options: ReadOptions
     calibration: Calibration
+    corner: tuple[int, int] = (0, 0)
+
+    def cropped(self, box: Box) -> Source:
+        """Return the part of the picture within a box as a picture of its own; raise `InputError` where it is none."""
+        assert_box(box, self.shape)
+        left, upper, right, lower = box
+        corner = self.corner[0] + left, self.corner[1] + upper
+        placed = self.calibration.cropped(box, self.shape[0])
+        return replace(self, shape=(lower - upper, right - left), calibration=placed, corner=corner)
 
     def read(self, box: Box) -> Picture:
         """Return the part of the picture within left, upper, right, lower bounds."""
-        left, upper, right, lower = box
+        across, down = self.corner
+        box = left, upper, right, lower = box[0] + across, box[1] + down, box[2] + across, box[3] + down
         path = Path(self.path)
         with decoding(path):
             if path.suffix == ".npy":
@@ -116,8 +129,9 @@ def _tiff(path: Path, options: ReadOptions) -> Source | None:
     trial = Source(str(path), shape, path.name, options, Calibration())
     if shape[0] * shape[1] < 2:
         return None
-    found = trial.read((0, 0, max(shape[1] - 1, 1), max(min(shape[0] - 1, 8), 1)))
-    return replace(trial, calibration=replace(found.calibration, origin=None))
+    lower = max(min(shape[0] - 1, 8), 1)
+    found = trial.read((0, 0, max(shape[1] - 1, 1), lower)).calibration
+    return replace(trial, calibration=found.cropped((0, 0, 0, shape[0]), lower))  # from there down to the lower edge
 
 
 def _decoded(path: Path, options: ReadOptions, scratch: Path) -> Source:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +128,7 @@ def mesh_tiles(
     output : path
         A folder for all files.
     options : MeshOptions, optional
-        As for one picture, without crop, tolerance, periodic, marks, colours "regions", and with square pixels.
+        As for one picture, without tolerance, periodic, marks, colours "regions", and with square pixels.
     tile : int
         Side of a tile, px.
     keep_whole : int
@@ -187,7 +187,6 @@ def _check(options: MeshOptions, form: str) -> None:
     if form not in FORMATS:
         raise InputError(f"format is {form}: give {' or '.join(FORMATS)}")
     refused = {
-        "crop": options.crop is not None,
         "tolerance": options.tolerance > 0.0,
         "periodic": options.periodic != "none",
         "frame": options.frame is not None,
@@ -218,20 +217,23 @@ def _job_of(source: Any, folder: Path, options: MeshOptions, tile: int, keep: in
     inside = folder / "work"
     inside.mkdir(exist_ok=True)
     found, stored = _source_of(source, inside, options)
+    if options.crop is not None:
+        found = found.cropped(options.crop)
     placed = options.placed(found.calibration, found.name)
     _check(placed, FORMATS[0])
     return Job(str(inside), found, grid_of(found.shape, tile, keep, work.largest_size(options)), placed), stored
 
 
 def _source_of(source: Any, inside: Path, options: MeshOptions) -> tuple[Source, Any]:
+    reading = replace(options, crop=None).reading()  # windows of the crop are read
     if isinstance(source, (str, Path)):
-        return source_of(Path(source), options.reading(), inside / "source.npy"), None
+        return source_of(Path(source), reading, inside / "source.npy"), None
     shape = tuple(source.shape)
     if len(shape) not in (2, 3) or (len(shape) == 3 and shape[2] > 4):
         raise InputError(f"the array has the shape {shape}: give (rows, columns) or (rows, columns, 1 to 4)")
     is_dask = hasattr(source, "__dask_graph__")
     path = inside / ("source.zarr" if is_dask else "source.npy")
-    made = Source(str(path), (int(shape[0]), int(shape[1])), "the array", options.reading(), Calibration())
+    made = Source(str(path), (int(shape[0]), int(shape[1])), "the array", reading, Calibration())
     if not is_dask:
         if not path.exists():
             save_plane(path, np.asarray(source))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import pyvista as pv
+import tifffile
 
 import imgquad_core as core
 from imgquad_core import MeshOptions
@@ -284,6 +285,24 @@ def test_gmsh_reads_all_names_of_a_picture_in_tiles(picture: Path, made: TiledMe
     assert n_quads == made.report["quality"]["n_quads"]
 
 
+def test_a_crop_of_a_map_lies_where_it_does_on_the_map(tmp_path: Path) -> None:
+    """To the bit the mesh of the part, read from a file that is never read as a whole."""
+    part, corner = (60, 20, 700, 480), (500_000.0, 4_000_000.0)
+    tags = [
+        (33550, "d", 3, (2.5, 2.5, 0.0), False),
+        (33922, "d", 6, (0.0, 0.0, 0.0, corner[0], corner[1] + 2.5 * SHAPE[0], 0.0), False),
+        (34735, "H", 12, (1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32633), False),
+    ]
+    tifffile.imwrite(tmp_path / "map.tif", drawn_labels(), tile=(64, 64), extratags=tags)
+    made = meshed(tmp_path / "map.tif", tmp_path / "out", how=MeshOptions(size=4.0, crop=part))
+    left, upper, right, lower = part
+    alone = meshed(drawn_labels()[upper:lower, left:right], tmp_path / "alone").mesh()
+    place = np.array(corner) + 2.5 * np.array([left, SHAPE[0] - lower])
+    assert np.array_equal(made.mesh().points, alone.points * 2.5 + place)
+    run = core.run(tmp_path / "map.tif", MeshOptions(size=4.0, crop=part))
+    assert np.array_equal(run.mesh.points.min(axis=0), made.mesh().points.min(axis=0))
+
+
 def test_options_of_decks_are_checked_before_any_work(picture: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.msh has no option 'thickness'"):
         meshed(picture, tmp_path / "out", deck=tmp_path / "a.msh", deck_options={"thickness": 2.0})
@@ -307,7 +326,7 @@ def test_memory_that_does_not_do_is_told_with_the_tile_and_what_fits(
 @pytest.mark.parametrize(
     ("how", "message"),
     [
-        ({"crop": (0, 0, 500, 500)}, "crop is"),
+        ({"crop": (0, 0, 911, 500)}, "crop 0,0,911,500 is not a box in a picture of 910 x 500 pixels"),
         ({"tolerance": 2.0}, "tolerance is 2.0"),
         ({"periodic": "x"}, "periodic is x"),
         ({"pixel_size": (1.0, 2.0)}, "need square pixels"),
