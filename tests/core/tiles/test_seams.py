@@ -1,0 +1,119 @@
+"""Seams through large regions: boundaries hardly know of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from imgquad_core.boundary import ExtractionOptions, SmoothingOptions, extract_boundaries, smooth_boundaries
+from imgquad_core.cleanup.faces import FaceQuads
+from imgquad_core.mesher.strides import judged
+from imgquad_core.model import BoundaryGraph, PointKind
+from imgquad_core.tiles.outlines import Outlines, outlines_of, settled
+from imgquad_core.tiles.regions import Keys, Regions
+from support.labels import label_image
+
+SHAPE, LINE = (120, 160), 80
+SMOOTHING = SmoothingOptions(size=4.0, step=(1.0, 1.0))
+
+
+def outlines(labels: np.ndarray, t: int) -> Outlines:
+    """Outlines of one of two tiles beside a line from top to bottom, all regions of the picture being cut."""
+    image = label_image(labels.astype(np.int32))
+    whole = extract_boundaries(image, ExtractionOptions())
+    assert len(np.unique(labels)) == len(whole.region_label)  # a region a label: they number each other
+    tile = (np.indices(SHAPE)[1] >= LINE).astype(np.int64)
+    codes, pixels = np.unique(2 * labels + tile, return_inverse=True)
+    keys = Keys(pixels.reshape(SHAPE).astype(np.int32), codes // 2, codes % 2)
+    none = np.empty(0, np.int64)
+    known = Regions(np.arange(labels.max() + 1, dtype=np.int32), none, none, np.ones(9, bool), none, none)
+    return outlines_of(t, keys, (0, 0, *SHAPE[::-1]), SHAPE[0], known, ExtractionOptions(), SMOOTHING)
+
+
+def layers(slope: float) -> np.ndarray:
+    y, x = np.indices(SHAPE) + 0.5
+    return (y - 60 > slope * (x - LINE)).astype(np.int64)
+
+
+def edges(found: Outlines, seam: bool) -> np.ndarray:
+    """Lengths of the edges of seams, or of boundaries inside the picture."""
+    inner = (found.owner < 2) & (found.seam == seam) & (found.shared if seam else (found.sides >= -1).all(axis=1))
+    lengths = []
+    for c in np.flatnonzero(inner):
+        xy = found.points[found.ids[found.offsets[c] : found.offsets[c + 1]]]
+        if not (((xy == 0) | (xy == SHAPE[::-1])).all(axis=0)).any():
+            lengths.append(np.hypot(*np.diff(xy, axis=0).T))
+    return np.concatenate(lengths)
+
+
+@pytest.mark.parametrize("slope", [0.3, 1.0, 3.0, 8.0])
+def test_edges_of_a_boundary_are_no_shorter_where_a_seam_crosses_it(slope: float) -> None:
+    """However small the angle; where its pixels run along the line of tiles, it has one node there, not two."""
+    labels = layers(slope)
+    alone = smooth_boundaries(extract_boundaries(label_image(labels.astype(np.int32))), SMOOTHING)
+    inner = np.flatnonzero((alone.chain_regions >= 0).all(axis=1))
+    least = min(np.hypot(*np.diff(alone.points[alone.chain(int(c))], axis=0).T).min() for c in inner)
+    for t in (0, 1):
+        found = outlines(labels, t)
+        assert found.seam.sum() == 2
+        assert edges(found, seam=False).min() > 0.8 * least
+        assert len(found.node) == 3  # the crossing, and both ends of the line
+
+
+def test_both_tiles_have_the_same_nodes_at_a_crossing() -> None:
+    labels = layers(5.0)
+    both = [outlines(labels, t) for t in (0, 1)]
+    tables = [sorted(map(tuple, found.node[:, 1:].tolist())) for found in both]
+    assert tables[0] == tables[1]
+    merged = settled(1, both[1], lambda other: both[other])
+    seams = [{tuple(found.key[c]) for c in np.flatnonzero(found.seam)} for found in both]
+    assert seams[0] == seams[1]
+    kinds = {
+        int(merged.kind[p])
+        for c in np.flatnonzero(merged.seam)
+        for p in merged.ids[merged.offsets[c] + 1 : merged.offsets[c + 1] - 1]
+    }
+    assert kinds == {PointKind.SEAM}
+
+
+def test_a_seam_goes_round_what_is_close_beside_it() -> None:
+    y, x = np.indices(SHAPE) + 0.5
+    labels = (np.hypot(x - LINE + 16, y - 60) < 15).astype(np.int64)  # a pixel from the line
+    found = outlines(labels, 1)
+    (c,) = np.flatnonzero(found.seam)
+    xy = found.points[found.ids[found.offsets[c] : found.offsets[c + 1]]]
+    gap = np.hypot(xy[:, 0] - (LINE - 16), xy[:, 1] - 60) - 15
+    assert gap.min() > 3.0
+    assert xy[:, 0].min() > LINE - 1e-6
+    assert (xy[[0, -1], 0] == LINE).all()
+
+
+def test_areas_are_kept_where_a_seam_goes_round() -> None:
+    y, x = np.indices(SHAPE) + 0.5
+    labels = (np.hypot(x - LINE + 16, y - 60) < 15).astype(np.int64)
+    found = outlines(labels, 0)
+    (c,) = np.flatnonzero((found.owner == 0) & found.closed)
+    px, py = found.points[found.ids[found.offsets[c] : found.offsets[c + 1]]].T
+    area = 0.5 * abs(float((px[:-1] * py[1:] - px[1:] * py[:-1]).sum()))
+    assert area == pytest.approx(np.count_nonzero(labels), rel=1e-3)
+
+
+def test_valid_quads_at_seams_do_not_tell_how_good_a_face_is() -> None:
+    points = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 0.1), (3, 0), (3, 1)], float)
+    quads = np.array([(0, 1, 2, 3), (1, 4, 5, 2), (4, 6, 7, 5)])
+    faces = FaceQuads(points, quads, np.zeros(3, np.int64), np.arange(8), np.full(8, 4))
+    kind = np.zeros(8, np.uint8)
+    assert judged(faces, graph_with(kind)) is faces
+    kind[5] = PointKind.SEAM
+    assert judged(faces, graph_with(kind)).quads.tolist() == [[0, 1, 2, 3]]
+    points[5] = (2.0, -0.1)  # folded: that counts
+    assert len(judged(faces._replace(points=points), graph_with(kind)).quads) > 1
+
+
+def graph_with(kind: np.ndarray) -> Any:
+    none = np.empty(0, np.int64)
+    return BoundaryGraph(
+        np.zeros((len(kind), 2)), kind, np.zeros(1, np.int64), none, none.reshape(0, 2), none, none, (1, 1)
+    )
