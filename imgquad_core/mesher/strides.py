@@ -15,6 +15,7 @@ from imgquad_core.chains import halved
 from imgquad_core.cleanup.batches import batches_of
 from imgquad_core.cleanup.faces import FaceQuads, faces_only
 from imgquad_core.cleanup.options import CleanUp
+from imgquad_core.cleanup.strips import nodes_around
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.measures.quality import scaled_jacobian
@@ -39,6 +40,7 @@ EVEN = {4: 0.6, 6: 0.8}  # of the size inside, mean edge around a face at a stri
 ENOUGH = 0.65  # worst element from which a face is not tried with a smaller stride
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, at least; groups at most
+SEAM_RINGS = 6  # quads on each side of a seam that do not tell how good a face is
 LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
 CONTRADICTIONS = 6  # rounds in which chains are halved whose coarse outlines contradict each other
 
@@ -150,13 +152,18 @@ def _mesh_at_stride(
 
 
 def judged(part: FaceQuads, graph: BoundaryGraph) -> FaceQuads:
-    """Return the quads that tell how good faces are: all but valid ones at seams, which are mended later."""
+    """Return the quads that tell how good faces are: all but valid ones near seams, which are mended later."""
     is_seam = graph.point_kind == PointKind.SEAM
     if not is_seam.any():
         return part
-    at_seam = (is_seam[np.maximum(part.origin, 0)] & (part.origin >= 0))[part.quads].any(axis=1)
-    left_out = at_seam & (scaled_jacobian(part.points, part.quads) > 0.0)
+    left_out = near_seams(part.quads, is_seam[np.maximum(part.origin, 0)] & (part.origin >= 0))
+    left_out &= scaled_jacobian(part.points, part.quads) > 0.0
     return part._replace(quads=part.quads[~left_out], face=part.face[~left_out])
+
+
+def near_seams(quads: Ints, is_seam: Flags) -> Flags:
+    """Tell the quads that are made anew, or nearly so, when seams are gone."""
+    return np.asarray(nodes_around(quads, is_seam, SEAM_RINGS - 1)[quads].any(axis=1))
 
 
 def _groups_of(graph: BoundaryGraph, faces: Flags, sizes: Floats) -> list[Flags]:

@@ -12,6 +12,7 @@ from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.mesher import MeshingOptions, mesh_boundaries
+from imgquad_core.mesher.strides import near_seams
 from imgquad_core.model import VOID, PointKind, QuadMesh
 
 from .grid import Box
@@ -76,7 +77,7 @@ def _wished(mesh: QuadMesh, worst: float) -> Flags:
     """Tell the held chains with a quad that is worse than that beside them, those at seams left out."""
     is_seam, poor = mesh.point_kind == PointKind.SEAM, np.zeros(mesh.n_points, bool)
     is_poor = scaled_jacobian(mesh.points, mesh.quads) <= worst
-    poor[mesh.quads[is_poor & ~is_seam[mesh.quads].any(axis=1)]] = True
+    poor[mesh.quads[is_poor & ~near_seams(mesh.quads, is_seam)]] = True
     poor &= mesh.point_kind == PointKind.HELD
     return np.asarray(np.logical_or.reduceat(poor[mesh.chain_points], mesh.chain_offsets[:-1]))
 

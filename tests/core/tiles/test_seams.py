@@ -9,7 +9,7 @@ import pytest
 
 from imgquad_core.boundary import ExtractionOptions, SmoothingOptions, extract_boundaries, smooth_boundaries
 from imgquad_core.cleanup.faces import FaceQuads
-from imgquad_core.mesher.strides import judged
+from imgquad_core.mesher.strides import SEAM_RINGS, judged
 from imgquad_core.model import BoundaryGraph, PointKind
 from imgquad_core.tiles.outlines import Outlines, outlines_of, settled
 from imgquad_core.tiles.regions import Keys, Regions
@@ -100,16 +100,20 @@ def test_areas_are_kept_where_a_seam_goes_round() -> None:
     assert area == pytest.approx(np.count_nonzero(labels), rel=1e-3)
 
 
-def test_valid_quads_at_seams_do_not_tell_how_good_a_face_is() -> None:
-    points = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 0.1), (3, 0), (3, 1)], float)
-    quads = np.array([(0, 1, 2, 3), (1, 4, 5, 2), (4, 6, 7, 5)])
-    faces = FaceQuads(points, quads, np.zeros(3, np.int64), np.arange(8), np.full(8, 4))
-    kind = np.zeros(8, np.uint8)
+def test_valid_quads_near_seams_do_not_tell_how_good_a_face_is() -> None:
+    """A row of quads: those at its start are near a seam, and count if they are folded only."""
+    n = 2 * SEAM_RINGS
+    x = np.arange(n + 1.0)
+    points = np.concatenate([np.stack([x, 0 * x], axis=1), np.stack([x, 0 * x + 1], axis=1)])
+    k = np.arange(n)
+    quads = np.stack([k, k + 1, k + n + 2, k + n + 1], axis=1)
+    faces = FaceQuads(points, quads, np.zeros(n, np.int64), np.arange(2 * n + 2), np.full(2 * n + 2, 4))
+    kind = np.zeros(2 * n + 2, np.uint8)
     assert judged(faces, graph_with(kind)) is faces
-    kind[5] = PointKind.SEAM
-    assert judged(faces, graph_with(kind)).quads.tolist() == [[0, 1, 2, 3]]
-    points[5] = (2.0, -0.1)  # folded: that counts
-    assert len(judged(faces._replace(points=points), graph_with(kind)).quads) > 1
+    kind[0] = PointKind.SEAM
+    assert np.array_equal(judged(faces, graph_with(kind)).quads, quads[SEAM_RINGS:])
+    points[n + 2] = (1.0, -0.5)
+    assert np.array_equal(judged(faces._replace(points=points), graph_with(kind)).quads[:2], quads[:2])
 
 
 def graph_with(kind: np.ndarray) -> Any:
