@@ -71,7 +71,7 @@ class Draft(NamedTuple):
     real_ends: Ends | None = None  #: the ends without these
 
     def marks(self, points: Floats, strided: Strided, is_new: Flags, gently: bool) -> Bytes:
-        """Mark the segments of a strided that are in conflict."""
+        """Mark the segments at a stride that are in conflict."""
         if self.is_seam is None or self.real_ends is None or not self.is_seam.any():
             return mark_conflicts(points, strided, self.ends, is_new, gently, self.shape, self.units)
         marks = mark_conflicts(points, strided, self.ends, is_new, False, self.shape, self.units)
