@@ -18,13 +18,20 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from PIL import Image
+
+if TYPE_CHECKING:
+    from imgquad_core import MeshOptions
+    from imgquad_core.orientation import Turn
+    from imgquad_core.pipeline import Run
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tests")]
@@ -33,6 +40,7 @@ Generator = np.random.Generator
 MESH_FORMATS = (".vtu", ".vtk", ".vtkhdf", ".inp", ".msh", ".bdf", ".e", ".npz", ".svg", ".obj", ".ply", ".dxf")
 COMMAND = [sys.executable, "-m", "imgquad_mesh"]
 MOST_SECONDS = 300
+LEAST_SIDE = 0.0  #: px, of a quad
 
 
 def path() -> str:
@@ -232,26 +240,111 @@ def mounts(rng: Generator, folder: Path) -> None:
     assert ("are kept in" if kind == "temporary left" else "are not kept") in done.stderr, (kind, done.stderr)
 
 
+def draw_case(rng: Generator) -> tuple[np.ndarray, dict[str, object]]:
+    """Return a picture and options; now and then a periodic cell, a tolerance, materials that are dropped or finer."""
+    labels = draw_labels(rng)
+    materials = np.unique(labels[labels >= 0])
+    more: dict[str, object] = {}
+    if rng.random() < 0.3:
+        more["periodic"] = str(rng.choice(["x", "y", "xy"]))
+    if rng.random() < 0.15:
+        more["tolerance"] = float(rng.choice([1.0, 2.5, 6.0]))
+    if rng.random() < 0.15 and len(materials) > 1:
+        more["drop"] = (int(rng.choice(materials)),)
+    if rng.random() < 0.15:
+        more["material_sizes"] = {int(rng.choice(materials)): float(rng.choice([0.7, 2.0, 9.0]))}
+    if rng.random() < 0.15:
+        more["pixel_size"] = tuple(rng.choice([0.4, 1.0, 1.7, 3.0], 2).tolist())
+    return labels, draw_options(rng, **more)
+
+
+def turned_options(options: dict[str, object], turn: Turn) -> dict[str, object]:
+    """Return the options that mean the same for a turned picture."""
+    changes: dict[str, object] = {}
+    if "periodic" in options:
+        changes["periodic"] = turn.directions(str(options["periodic"]))
+    if isinstance(sides := options.get("pixel_size"), tuple):
+        changes["pixel_size"] = turn.shape(sides)
+    return options | changes
+
+
 def meshes(rng: Generator, folder: Path) -> None:
-    """A mesh of any label picture: valid by the judge of the tests, twice the same bytes, and turned the same one."""
+    """A mesh of any label picture, or of a periodic cell: valid, its areas those of its boundary, no side too short,
+    the same bytes again with any number of threads, and the same mesh of the picture turned."""  # fmt: skip
     from imgquad_core import MeshOptions, run
+    from imgquad_core.errors import InputError
     from imgquad_core.orientation import TURNS
-    from support.invariants import assert_valid_mesh
     from support.labels import label_image
 
-    labels = draw_labels(rng)
-    options = MeshOptions(**draw_options(rng))  # type: ignore[arg-type]
-    made, again = run(label_image(labels), options), run(label_image(labels), options)
-    assert_valid_mesh(made.mesh, made.labels)
-    assert made.mesh.points.tobytes() == again.mesh.points.tobytes()
-    assert made.mesh.quads.tobytes() == again.mesh.quads.tobytes()
+    labels, drawn = draw_case(rng)
+    options = MeshOptions(**drawn)  # type: ignore[arg-type]
+    try:
+        made = judged(labels, options)
+    except InputError:
+        assert len(options.drop) * options.tolerance > 0, "nothing can be left only where both take something"
+        return
+    again = run(label_image(labels), replace(options, threads=int(rng.choice([1, 2, 16]))))
+    assert made.mesh.points.tobytes() == again.mesh.points.tobytes(), "other points at the second time"
+    assert made.mesh.quads.tobytes() == again.mesh.quads.tobytes(), "other quads at the second time"
+    assert np.array_equal(pickle.loads(pickle.dumps(made)).mesh.points, made.mesh.points)
     turn = TURNS[int(rng.integers(1, len(TURNS)))]
-    turned = run(turn.image(label_image(labels)), options)
-    assert_valid_mesh(turned.mesh, turned.labels)
+    turned = judged(turn.picture(labels), MeshOptions(**turned_options(drawn, turn)))  # type: ignore[arg-type]
     same = np.array_equal(turned.labels.labels, turn.picture(made.labels.labels))  # noise removal had no tie
     if same and options.policy != "diagonal":
-        assert turned.mesh.n_quads == made.mesh.n_quads
-    assert np.array_equal(pickle.loads(pickle.dumps(made)).mesh.points, made.mesh.points)
+        assert turned.mesh.n_quads == made.mesh.n_quads, f"{made.mesh.n_quads} quads, turned {turned.mesh.n_quads}"
+
+
+def judged(labels: np.ndarray, options: MeshOptions) -> Run:
+    """Return what a run makes of labels, after judging it."""
+    from imgquad_core import run
+    from support import invariants
+    from support.labels import label_image
+
+    made = run(label_image(labels), options)
+    judge = invariants.assert_simplified_mesh if options.tolerance else invariants.assert_valid_mesh
+    judge(made.mesh, made.labels, pixel_size=options.pixel_sides)
+    invariants.assert_accounted(made)
+    invariants.assert_areas_of_boundary(made)
+    if options.periodic != "none":
+        invariants.assert_opposite_sides_match(made.pixel_mesh, options.periodic)
+        assert_tied_where_whole(made, options.periodic)
+    shortest = invariants.shortest_side(made.pixel_mesh)
+    assert shortest >= LEAST_SIDE, f"a side of {shortest:.2g} px"
+    return made
+
+
+def assert_tied_where_whole(made: Run, directions: str) -> None:
+    """Fail unless each node of a side is tied, where no part of the picture is void; there as many as can be."""
+    from imgquad_core.errors import InputError
+    from imgquad_core.fe import ElementOptions, make_elements
+
+    whole = (made.labels.labels >= 0).all()
+    try:
+        pairs = make_elements(made.mesh, ElementOptions(periodic=directions)).periodic
+    except InputError:
+        assert not whole
+        return
+    assert set(pairs) == set(directions)
+    for direction, ids in pairs.items():
+        on = made.mesh.points[:, "xy".index(direction)]
+        assert not whole or len(ids) == np.count_nonzero(on == on.min()), "nodes of a side without a partner"
+
+
+def cells(rng: Generator, folder: Path) -> None:
+    """Periodic cells of tileable pictures with cohesive interfaces, of both orders: all nodes tied, none unused."""
+    from imgquad_core import MeshOptions, mesh_image
+    from imgquad_core.fe import ElementOptions, make_elements
+    from support.cells import assert_tied, assert_whole, tileable
+
+    shape = tuple(rng.integers(30, 80, 2).tolist())
+    labels = tileable(int(rng.integers(1 << 30)), shape)
+    mesh = mesh_image(labels, MeshOptions(size=float(rng.choice([1.5, 3.0, 5.0])), periodic="xy"))
+    for order in (1, 2):
+        made = make_elements(mesh, ElementOptions(order=order, cohesive="all", periodic="xy"))
+        plain = make_elements(mesh, ElementOptions(order=order, periodic="xy"))
+        assert_tied(made)
+        assert_whole(made)
+        assert all(len(made.periodic[d]) >= len(plain.periodic[d]) for d in "xy"), "ties lost by splitting"
 
 
 def elements(rng: Generator, folder: Path) -> None:
@@ -365,6 +458,7 @@ SECTIONS = {
         (mounts, 40),
         (meshes, 4000),  # two pictures each: as it is and turned
         (elements, 1500),
+        (cells, 40),
         (threads, 10),
         (options, 400),
         (readers, 3000),
@@ -390,7 +484,9 @@ def campaign(name: str, seed: int, times: int) -> Outcome:
             try:
                 SECTIONS[name].trial(rng, Path(folder))
             except Exception as error:  # whatever it is, it is a fault
-                failed.append(f"{name}, seed {seed}, trial {k}: {type(error).__name__}: {str(error)[:300]}")
+                line = traceback.extract_tb(error.__traceback__)[-1]
+                place = f"{Path(line.filename).name}:{line.lineno}"
+                failed.append(f"{name}, seed {seed}, trial {k}: {place}: {type(error).__name__}: {str(error)[:300]}")
     return Outcome(times, failed, time.perf_counter() - start)
 
 
@@ -398,7 +494,7 @@ def table(outcomes: dict[str, Outcome]) -> str:
     """Return the table of the docs."""
     lines = ["| section | what | tried | failed |", "|---|---|---:|---:|"]
     for name, found in outcomes.items():
-        what = (SECTIONS[name].trial.__doc__ or "").strip().rstrip(".")
+        what = " ".join((SECTIONS[name].trial.__doc__ or "").split()).rstrip(".")
         lines.append(f"| {name} | {what} | {found.tried} | {len(found.failed)} |")
     return "\n".join(lines)
 
@@ -410,6 +506,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--share", type=float, default=1.0, help="of the trials of each section (default: 1)")
     args = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # started in the background, `kills` would ignore it
     outcomes = {}
     for name in args.sections or SECTIONS:
         outcomes[name] = campaign(name, args.seed, max(1, round(args.share * SECTIONS[name].times)))

@@ -60,6 +60,10 @@ class Turn(NamedTuple):
         """Return (n_rows, n_cols) of a picture in this position; and, as it is its own inverse, what they were."""
         return shape[::-1] if self.transposed else shape
 
+    def directions(self, directions: str) -> str:
+        """Return "x", "y" or "xy" of a picture as they are called in this position."""
+        return {"x": "y", "y": "x"}.get(directions, directions) if self.transposed else directions
+
     def points(self, points: Floats, shape: tuple[int, int]) -> Floats:
         """Return x, y of a picture of `shape` in this position."""
         return self._flipped(_transposed(points, shape) if self.transposed else points, self.shape(shape))

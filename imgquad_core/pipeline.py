@@ -319,8 +319,10 @@ def smooth(
     _assert_feasible(shape, options.size)
     oblong = options.step != "auto" and len(set(as_step(options.step))) > 1  # width and height stay what they are
     turn = turn_of_graph(graph, SQUARE_ON if oblong else TURNS)
-    graph = turn.graph_back(smooth_boundaries(turn.graph(graph), options, turn.shape(shape)))
-    return match_opposite_sides(graph, periodic) if periodic != "none" else graph
+    smoothed = smooth_boundaries(turn.graph(graph), options, turn.shape(shape))
+    if periodic != "none":
+        smoothed = match_opposite_sides(smoothed, turn.directions(periodic))
+    return turn.graph_back(smoothed)
 
 
 def fill_boundaries(
@@ -331,25 +333,18 @@ def fill_boundaries(
     told: Callable[[float], None] | None = None,
 ) -> tuple[BoundaryGraph, QuadMesh]:
     """Mesh; where the mesher has cut edges of one side of a periodic cell only, cut the other, too, and mesh anew."""
-    mesh = _meshed(boundary, options, materials, told)
+    turn = turn_of_graph(boundary)
+    graph = turn.graph(boundary)
+    mesh = mesh_boundaries(graph, options, materials, told)
     for attempt in range(_MATCHES if periodic != "none" else 0):
-        again = rematch(boundary, mesh, periodic)
+        again = rematch(graph, mesh, turn.directions(periodic))
         if again is None:
             break
         if attempt >= _MATCHES // 2:  # only what must be cut is: wishes of both sides may go on and on
             options = replace(options, tuning=options.tuning._replace(wishes=0))
-        boundary, mesh = again, _meshed(again, options, materials)
-    return boundary, mesh
-
-
-def _meshed(
-    boundary: BoundaryGraph,
-    options: MeshingOptions,
-    materials: Materials,
-    told: Callable[[float], None] | None = None,
-) -> QuadMesh:
-    turn = turn_of_graph(boundary)
-    return turn.mesh_back(mesh_boundaries(turn.graph(boundary), options, materials, told), boundary.shape)
+        graph, mesh = again, mesh_boundaries(again, options, materials)
+        boundary = turn.graph_back(graph)
+    return boundary, turn.mesh_back(mesh, boundary.shape)
 
 
 class _Stopwatch:

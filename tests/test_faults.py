@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -15,8 +16,9 @@ SLICE = {
     "full-disks": 2,
     "caches": 2,
     "mounts": 4,
-    "meshes": 12,
+    "meshes": 25,
     "elements": 15,
+    "cells": 2,
     "threads": 1,
     "options": 4,
     "readers": 150,
@@ -48,5 +50,7 @@ def test_a_trial_that_fails_is_told_with_its_seed(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setitem(faults.SECTIONS, "broken", faults.Section(broken, 3))
     found = faults.campaign("broken", 5, 2)
-    assert found.failed == [f"broken, seed 5, trial {k}: ValueError: broken" for k in range(2)]
+    for k, told in enumerate(found.failed):
+        assert re.fullmatch(rf"broken, seed 5, trial {k}: test_faults.py:\d+: ValueError: broken", told)
+    assert len(found.failed) == 2
     assert faults.table({"broken": found}).endswith("| broken | It breaks | 2 | 2 |")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -77,9 +79,19 @@ def test_the_diagonal_policy_is_of_the_picture_as_it_lies() -> None:
     assert sorted(extract(label_image(labels[::-1]), diagonal).region_label.tolist()) == [0, 0, 1]
 
 
-def assert_alike(labels: np.ndarray, turn: Turn, options: MeshOptions) -> None:
+@pytest.mark.parametrize("turn", TURNS[1:])
+@pytest.mark.parametrize("directions", ["x", "xy"])
+def test_so_it_is_with_periodic_cells(turn: Turn, directions: str) -> None:
+    labels = labels_of_kind("cells", 16, 19, 5, 5)
+    options = MeshOptions(size=1.0, min_pixels=0, min_length=0.0, periodic=directions)
+    assert_alike(labels, turn, options, replace(options, periodic=turn.directions(directions)))
+
+
+def assert_alike(
+    labels: np.ndarray, turn: Turn, options: MeshOptions, turned_options: MeshOptions | None = None
+) -> None:
     plain = run(label_image(labels), options).mesh
-    turned = run(turn.image(label_image(labels)), options).mesh
+    turned = run(turn.image(label_image(labels)), turned_options or options).mesh
     assert np.allclose(turn.points(plain.points, labels.shape), turned.points, rtol=0, atol=1e-9)
     assert np.array_equal(plain.quads[:, [0, 3, 2, 1]] if turn.swaps_hands else plain.quads, turned.quads)
     assert np.array_equal(plain.quad_material, turned.quad_material)

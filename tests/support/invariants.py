@@ -12,13 +12,19 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from imgquad_core.boundary.areas import enclosed_areas
 from imgquad_core.model import VOID, LabelImage, PointKind, QuadMesh
+from imgquad_core.picture.selection import material_number
 from imgquad_core.pipeline import Run
 
 Array = NDArray[Any]
+_PIXELS = 10**6  # looked at at once
 
 
-def assert_valid_mesh(mesh: QuadMesh, image: LabelImage, *, pixel_size: float = 1.0) -> None:
+Lengths = float | tuple[float, float]
+
+
+def assert_valid_mesh(mesh: QuadMesh, image: LabelImage, *, pixel_size: Lengths = 1.0) -> None:
     """Fail unless `mesh` is a valid all-quad mesh of `image`: convex, conforming, whole, of the right materials."""
     rows, cols = image.shape
     points = np.asarray(mesh.points) / pixel_size
@@ -30,10 +36,10 @@ def assert_valid_mesh(mesh: QuadMesh, image: LabelImage, *, pixel_size: float = 
     assert_materials(mesh, points, image)
 
 
-def assert_simplified_mesh(mesh: QuadMesh, labels: LabelImage) -> None:
+def assert_simplified_mesh(mesh: QuadMesh, labels: LabelImage, *, pixel_size: Lengths = 1.0) -> None:
     """Fail unless `mesh` is valid, with the materials of `labels`, its void left out; outlines may have moved."""
     rows, cols = labels.shape
-    points = np.asarray(mesh.points)
+    points = np.asarray(mesh.points) / pixel_size
     assert_arrays(mesh)
     assert_convex(points, mesh.quads)
     assert_conforming(mesh)
@@ -42,10 +48,44 @@ def assert_simplified_mesh(mesh: QuadMesh, labels: LabelImage) -> None:
     solid = labels.labels != VOID
     assert np.array_equal(np.unique(mesh.quad_material), np.unique(labels.labels[solid]))
     if solid.all():
-        p = points[mesh.quads]
-        x, y = p[..., 0], p[..., 1]
-        area = 0.5 * ((x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0]))
-        assert np.isclose(area.sum(), solid.size, rtol=1e-9)
+        assert np.isclose(quad_areas(points, mesh.quads).sum(), solid.size, rtol=1e-9)
+
+
+def assert_areas_of_boundary(done: Run) -> None:
+    """Fail unless each region has the area within its boundary, to rounding: none is lost, none lies over another."""
+    mesh = done.pixel_mesh
+    found = np.bincount(mesh.quad_region, quad_areas(mesh.points, mesh.quads), len(mesh.region_label))
+    assert np.array_equal(mesh.region_label, done.boundary.region_label)
+    assert np.allclose(found, enclosed_areas(done.boundary), rtol=1e-9, atol=1e-9)
+
+
+def assert_opposite_sides_match(mesh: QuadMesh, directions: str) -> None:
+    """Fail if a node of one side of the border lies within an edge of the opposite side."""
+    for axis in map("xy".index, directions):
+        low, high = (_edges_at(mesh, axis, level) for level in (0.0, mesh.points[:, axis].max()))
+        for edges, others in ((low, high), (high, low)):
+            places = np.unique(others)
+            within = np.searchsorted(places, edges[:, 0], "right") < np.searchsorted(places, edges[:, 1], "left")
+            assert not within.any(), f"nodes within edges of the opposite side, first at {edges[within][0]}"
+
+
+def _edges_at(mesh: QuadMesh, axis: int, level: float) -> Array:
+    """Lower and upper ends of the edges on one side of the border, shape (n, 2)."""
+    ends = np.stack(_half_edges(mesh.quads), axis=1)
+    ends = ends[(mesh.points[ends, axis] == level).all(axis=1)]
+    return np.sort(mesh.points[ends, 1 - axis], axis=1)
+
+
+def shortest_side(mesh: QuadMesh) -> float:
+    """Length of the shortest side of a quad."""
+    start, end = _half_edges(mesh.quads)
+    return float(np.linalg.norm(mesh.points[start] - mesh.points[end], axis=1).min())
+
+
+def quad_areas(points: Array, quads: Array) -> Array:
+    """Area of each quad, negative where it runs clockwise."""
+    x, y = np.moveaxis(points[quads], 2, 0)
+    return 0.5 * ((x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0]))
 
 
 def assert_accounted(done: Run) -> None:
@@ -53,7 +93,8 @@ def assert_accounted(done: Run) -> None:
     solid = done.clean.labels[done.clean.labels != VOID]
     was, now = np.unique(solid), np.unique(done.mesh.quad_material)
     gone = {row.material for row in done.absorbed if row.lost == row.pixels and row.absorbed == row.regions}
-    assert set(was.tolist()) == set(now.tolist()) | gone
+    dropped = {material_number(done.clean.materials, name) for name in done.options.drop}
+    assert set(was.tolist()) == set(now.tolist()) | gone | dropped
     assert gone.isdisjoint(now.tolist())
     for row in done.absorbed:
         assert row.pixels == np.count_nonzero(solid == row.material)
@@ -146,11 +187,8 @@ def assert_materials(mesh: QuadMesh, points: Array, image: LabelImage) -> None:
     """Every material of the picture, no other, where the picture has it; the area is that of the pixels."""
     solid = image.labels != VOID
     assert np.array_equal(np.unique(mesh.quad_material), np.unique(image.labels[solid]))
-    p = points[mesh.quads]
-    x, y = p[..., 0], p[..., 1]
-    area = 0.5 * ((x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0]))
     if solid.all():
-        assert np.isclose(area.sum(), solid.size, rtol=1e-9)
+        assert np.isclose(quad_areas(points, mesh.quads).sum(), solid.size, rtol=1e-9)
     size = {"size": 3, "mode": "nearest"}
     away = maximum_filter(image.labels, **size) == minimum_filter(image.labels, **size)
     found = rasterise(points, mesh.quads, mesh.quad_material, image.shape)
@@ -164,13 +202,18 @@ def rasterise(points: Array, quads: Array, values: Array, shape: tuple[int, int]
     """Value of the (convex, counter-clockwise) quad that holds each pixel's centre, VOID where none does."""
     rows, cols = shape
     out = np.full(shape, VOID, np.int64)
-    for p, value in zip(points[quads], values, strict=True):
-        x0, y0 = np.maximum(np.floor(p.min(axis=0)).astype(int), 0)
-        x1, y1 = np.minimum(np.ceil(p.max(axis=0)).astype(int), (cols, rows))
-        x, y = np.meshgrid(np.arange(x0, x1) + 0.5, np.arange(y0, y1) + 0.5)
-        e = np.roll(p, -1, axis=0) - p
-        inside = np.all([d[0] * (y - a[1]) - d[1] * (x - a[0]) >= -1e-9 for a, d in zip(p, e, strict=True)], axis=0)
-        out[rows - 1 - np.floor(y[inside]).astype(int), np.floor(x[inside]).astype(int)] = value
+    corners = points[quads]
+    first = np.maximum(np.floor(corners.min(axis=1)).astype(np.int64), 0)
+    width, height = (np.minimum(np.ceil(corners.max(axis=1)).astype(np.int64), (cols, rows)) - first).T
+    begins = np.arange(0, _PIXELS + (width * height).sum(), _PIXELS)
+    for some in np.split(np.arange(len(quads)), np.searchsorted(np.cumsum(width * height), begins)):
+        quad = np.repeat(some, (width * height)[some])
+        k = np.arange(len(quad)) - np.searchsorted(quad, quad)  # number of the pixel in the box around its quad
+        at = first[quad] + np.stack([k % width[quad], k // width[quad]], axis=1)
+        to = (at + 0.5)[:, None] - corners[quad]
+        e = np.roll(corners, -1, axis=1)[quad] - corners[quad]
+        inside = (e[..., 0] * to[..., 1] - e[..., 1] * to[..., 0] >= -1e-9).all(axis=1)
+        out[rows - 1 - at[inside, 1], at[inside, 0]] = values[quad[inside]]
     return out
 
 
