@@ -277,18 +277,18 @@ def meshes(rng: Generator, folder: Path) -> None:
     from support.labels import label_image
 
     labels, drawn = draw_case(rng)
-    options = MeshOptions(**drawn)  # type: ignore[arg-type]
+    options = MeshOptions(**drawn, threads=1)  # type: ignore[arg-type]
     try:
         made = judged(labels, options)
     except InputError:
         assert len(options.drop) * options.tolerance > 0, "nothing can be left only where both take something"
         return
-    again = run(label_image(labels), replace(options, threads=int(rng.choice([1, 2, 16]))))
+    again = run(label_image(labels), replace(options, threads=int(rng.choice([2, 16]))))
     assert made.mesh.points.tobytes() == again.mesh.points.tobytes(), "other points at the second time"
     assert made.mesh.quads.tobytes() == again.mesh.quads.tobytes(), "other quads at the second time"
     assert np.array_equal(pickle.loads(pickle.dumps(made)).mesh.points, made.mesh.points)
     turn = TURNS[int(rng.integers(1, len(TURNS)))]
-    turned = judged(turn.picture(labels), MeshOptions(**turned_options(drawn, turn)))  # type: ignore[arg-type]
+    turned = judged(turn.picture(labels), MeshOptions(**turned_options(drawn, turn), threads=1))  # type: ignore[arg-type]
     same = np.array_equal(turned.labels.labels, turn.picture(made.labels.labels))  # noise removal had no tie
     if same and options.policy != "diagonal":
         assert turned.mesh.n_quads == made.mesh.n_quads, f"{made.mesh.n_quads} quads, turned {turned.mesh.n_quads}"
