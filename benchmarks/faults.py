@@ -126,17 +126,18 @@ from pathlib import Path
 import numpy as np
 from imgquad_core import mesh_image
 from imgquad_core.errors import InputError
-from imgquad_mesh.outputs.files import write_mesh_file
+from imgquad_mesh.outputs.files import write_mesh_file, write_picture
 path, share = Path(sys.argv[1]), float(sys.argv[2])
 labels = np.zeros((40, 60), np.int32); labels[10:30, 20:40] = 1
 mesh = mesh_image(labels)
-write_mesh_file(mesh, path)
+write = write_picture if path.stem == "picture" else write_mesh_file
+write(mesh, path)
 whole = path.read_bytes()
 path.write_bytes(b"old")
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(share * len(whole)),) * 2)
 try:
-    write_mesh_file(mesh, path)
+    write(mesh, path)
     assert path.read_bytes() == whole, "a damaged file"
 except InputError as error:
     assert path.read_bytes() == b"old" and "cannot write" in str(error), error
@@ -146,7 +147,8 @@ assert not list(path.parent.glob(".imgquad-*")), "leftovers"
 
 def full_disks(rng: Generator, folder: Path) -> None:
     """A limit on the size of files, from 2 to 120 % of what is needed: one line, the old file whole."""
-    target, share = folder / f"m{rng.choice(MESH_FORMATS)}", rng.uniform(0.02, 1.2)
+    names = [f"m{extension}" for extension in MESH_FORMATS] + ["picture.png", "picture.pdf", "picture.svg"]
+    target, share = folder / rng.choice(names), rng.uniform(0.02, 1.2)
     env = os.environ | {"PYTHONPATH": path(), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(
         [sys.executable, "-c", FULL, str(target), str(share)], capture_output=True, text=True, env=env, check=False

@@ -36,6 +36,10 @@ def decoding(path: Path) -> Iterator[None]:
         yield
     except InputError:
         raise
+    except MemoryError as error:
+        raise InputError(
+            f"{path} takes more memory to read than there is: end other programs, cut the picture, or make it smaller"
+        ) from error
     except Exception as error:
         # decoders raise OSError, SyntaxError, ValueError, struct.error, zlib.error, IndexError ... on broken files
         text = " ".join(str(error).split()) or type(error).__name__

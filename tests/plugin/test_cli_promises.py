@@ -113,6 +113,32 @@ def test_the_mesh_and_the_report_are_there_when_the_picture_fails(
     assert json.loads((folder / "m.json").read_text())["output"] == "m.vtu"
 
 
+FULL = """
+import resource, signal, sys
+from pathlib import Path
+from imgquad_core import mesh_image
+from imgquad_core.errors import InputError
+from imgquad_mesh.outputs.files import write_picture
+mesh = mesh_image([[0, 1], [1, 0]])
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+try:
+    write_picture(mesh, Path(sys.argv[1]))
+except InputError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a limit of POSIX")
+@pytest.mark.parametrize("extension", ["pdf", "png", "svg"])
+def test_a_picture_on_a_full_disk_is_one_line_and_the_old_one_stays(folder: Path, extension: str) -> None:
+    target = folder / f"p.{extension}"
+    target.write_bytes(b"old")
+    done = subprocess.run([sys.executable, "-c", FULL, str(target)], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith(f"cannot write {target}")
+    assert target.read_bytes() == b"old"
+
+
 def test_names_that_cannot_be_shown_are_written_all_the_same(folder: Path) -> None:
     name = os.fsdecode(b"rock\xff.png")
     (folder / "rock.png").rename(folder / name)

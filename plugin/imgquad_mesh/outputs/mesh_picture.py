@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -44,10 +45,12 @@ def draw_materials(mesh: QuadMesh, path: Path) -> None:
     keys = [Patch(facecolor=colors[np.searchsorted(mesh.materials.labels, m)], edgecolor="black") for m in used[:24]]
     names = [mesh.materials.name_of(int(m)) for m in used[:24]]
     figure.legend(keys, names, loc="center right", frameon=False, fontsize=11)
+    whole = BytesIO()  # matplotlib's PDF has errors of its own on a full disk
     with rc_context({"svg.hashsalt": "imgquad-mesh"}):  # names of shapes that hang on nothing else
         figure.savefig(
-            path, format=path.suffix.lstrip(".").lower() or "png", facecolor="white", metadata=_undated(path)
+            whole, format=path.suffix.lstrip(".").lower() or "png", facecolor="white", metadata=_undated(path)
         )
+    path.write_bytes(whole.getbuffer())
 
 
 def material_colors(materials: Materials) -> NDArray[np.float64]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import os
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -286,6 +288,35 @@ def test_a_picture_is_called_by_its_name_in_messages(tmp_path: Path) -> None:
             read_picture(path, name="steel.png")
         assert "steel.png" in str(caught.value)
         assert "upload" not in str(caught.value)
+
+
+HUNGRY = """
+import resource, sys
+from imgquad_core.errors import InputError
+from imgquad_core.reading import read_picture
+read_picture(sys.argv[1])
+now = next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmSize"))
+resource.setrlimit(resource.RLIMIT_AS, (now * 1024 + 8 * 2**20, resource.RLIM_INFINITY))
+try:
+    read_picture(sys.argv[2])
+except InputError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="a limit of memory that Linux keeps")
+def test_memory_that_runs_out_is_not_told_as_a_damaged_file(tmp_path: Path) -> None:
+    small = saved(tmp_path / "small.png", GREY)
+    large = saved(tmp_path / "large.png", np.zeros((5000, 5000), np.uint8))
+    asked = [sys.executable, "-c", HUNGRY, str(small), str(large)]
+    said = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+    assert said.startswith(f"{large} takes more memory to read than there is: ")
+
+
+def test_half_floats_are_labels_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
+    labels = np.array([[0, 1], [60000, 1]], np.float16)
+    assert (picture_of(labels).values == labels).all()
+    assert not recwarn.list
 
 
 def test_arrays_in_memory_mean_what_files_mean() -> None:
