@@ -59,17 +59,17 @@ def assert_areas_of_boundary(done: Run) -> None:
     assert np.allclose(found, enclosed_areas(done.boundary), rtol=1e-9, atol=1e-9)
 
 
-def assert_opposite_sides_match(mesh: QuadMesh, directions: str) -> None:
-    """Fail if a node of one side of the border lies within an edge of the opposite side."""
+def assert_opposite_sides_match(mesh: QuadMesh, directions: str, shape: tuple[int, int]) -> None:
+    """Fail if a node of one side of a picture of `shape` lies within an edge of the opposite side."""
     for axis in map("xy".index, directions):
-        low, high = (_edges_at(mesh, axis, level) for level in (0.0, mesh.points[:, axis].max()))
+        low, high = (_edges_at(mesh, axis, level) for level in (0, shape[1 - axis]))
         for edges, others in ((low, high), (high, low)):
             places = np.unique(others)
             within = np.searchsorted(places, edges[:, 0], "right") < np.searchsorted(places, edges[:, 1], "left")
             assert not within.any(), f"nodes within edges of the opposite side, first at {edges[within][0]}"
 
 
-def _edges_at(mesh: QuadMesh, axis: int, level: float) -> Array:
+def _edges_at(mesh: QuadMesh, axis: int, level: int) -> Array:
     """Lower and upper ends of the edges on one side of the border, shape (n, 2)."""
     ends = np.stack(_half_edges(mesh.quads), axis=1)
     ends = ends[(mesh.points[ends, axis] == level).all(axis=1)]
