@@ -106,7 +106,7 @@ class MeshOptions:
     periodic : "none", "x", "y" or "xy"
         Opposite sides get nodes at the same places, for a periodic cell; see `match_opposite_sides`.
     max_pixels : int
-        Larger pictures are refused.
+        Files of more pixels are refused before they are decoded; an array is in memory already.
     effort : "fast", "normal" or "best"
         How far the mesh is optimised.
     threads : int

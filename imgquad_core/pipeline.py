@@ -64,6 +64,7 @@ T = TypeVar("T")
 Progress: TypeAlias = Callable[[str, float, int], None]
 STAGES = ("read", "segment", "denoise", "absorb", "boundary", "smooth", "mesh")
 MOST_QUADS = 200_000_000  #: more are refused before memory is
+_OF_FILES = ("frame", "channel", "level", "scalars", "info_bar", "grain_angle")  # of `ReadOptions`
 _MATCHES = 8  # rounds in which opposite sides of a periodic cell are cut alike
 
 
@@ -250,8 +251,9 @@ def read_source(source: Source, options: ReadOptions | None = None) -> Picture |
         return read_picture(source, options)
     if isinstance(source, (LabelImage, Picture)):
         return source
-    if options is not None and options.frame is not None:
-        raise InputError(f"frame is {options.frame}, which is of files; give one picture, as stack[{options.frame}]")
+    for name in _OF_FILES if options else ():
+        if (asked := getattr(options, name)) != getattr(ReadOptions(), name):
+            raise InputError(f"{name} is {asked!r}, which is of files; give the array that it means")
     try:
         return picture_of(np.asanyarray(source))
     except InputError:

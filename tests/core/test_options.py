@@ -64,8 +64,15 @@ def test_options_that_are_none_and_pictures_that_are_no_arrays() -> None:
         mesh_image(LABELS, {"size": 3})  # type: ignore[arg-type]
     with pytest.raises(InputError, match="rows of one length"):
         mesh_image([[1, 2], [3]])  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="frame is 1"):
-        mesh_image(LABELS, MeshOptions(frame=1))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"frame": 1}, {"channel": 0}, {"level": 1}, {"scalars": "a"}, {"info_bar": "crop"}, {"grain_angle": 9.0}],
+)
+def test_what_only_files_have_is_refused_of_arrays(values: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=f"{next(iter(values))} is .*, which is of files"):
+        mesh_image(LABELS, MeshOptions(**values))
 
 
 @pytest.mark.parametrize(
