@@ -130,6 +130,53 @@ def kill(rng: Generator, folder: Path, process: subprocess.Popen[str], lasts: fl
     assert "Traceback" not in said, said
 
 
+LATE = """
+import json, os, signal, sys, time
+from pathlib import Path
+import numpy as np
+from imgquad_mesh.__main__ import main
+
+rng, arguments, outputs = np.random.default_rng(int(sys.argv[1])), sys.argv[2:], [Path(n) for n in sys.argv[4:9:2]]
+assert main(arguments) == 0
+whole = [file.read_bytes() for file in outputs]
+begin = time.perf_counter()
+assert main(arguments) == 0  # all is loaded now
+lasts = time.perf_counter() - begin
+said = os.open("said", os.O_RDWR | os.O_CREAT)
+for _ in range(20):
+    for file in outputs:
+        file.write_bytes(b"old")
+    os.ftruncate(said, 0)
+    child = os.fork()
+    if not child:
+        os.dup2(said, 2)
+        os._exit(main(arguments))
+    number = int(rng.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT]))
+    time.sleep(rng.uniform(0.0, 1.2) * lasts)
+    os.kill(child, number)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    assert code in (0, -number, 128 + number), (number, code, Path("said").read_text())
+    assert "Traceback" not in Path("said").read_text(), Path("said").read_text()
+    for file, new in zip(outputs, whole):
+        now = file.read_bytes()
+        assert now in (b"old", new) or (file.suffix == ".json" and json.loads(now)), f"{file} is neither old nor whole"
+    left = list(Path().glob(".imgquad-*"))
+    assert number == signal.SIGKILL or not left, (number, left)
+    for folder in left:
+        os.system(f"rm -r {folder}")
+"""
+
+
+def late_kills(rng: Generator, folder: Path) -> None:
+    """Twenty signals to processes that have all loaded, so that they meet meshing and writing: the same holds."""
+    picture_file(folder, rng)
+    names = (f"m{rng.choice(MESH_FORMATS)}", "--report", "m.json", "--picture", f"p.{rng.choice(['png', 'svg'])}")
+    asked = [sys.executable, "-c", LATE, str(rng.integers(1 << 30)), "run", "in.png", *names, "--quiet"]
+    env = os.environ | {"PYTHONPATH": path(), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(asked, cwd=folder, env=env, capture_output=True, text=True, timeout=MOST_SECONDS, check=False)
+    assert done.returncode == 0, done.stderr[-500:]
+
+
 FULL = """
 import resource, signal, sys
 from pathlib import Path
@@ -475,7 +522,8 @@ class Section(NamedTuple):
 SECTIONS = {
     f.__name__.replace("_", "-"): Section(f, times)
     for f, times in (
-        (kills, 50),
+        (kills, 20),
+        (late_kills, 20),
         (full_disks, 50),
         (caches, 60),
         (mounts, 40),

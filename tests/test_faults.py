@@ -12,8 +12,9 @@ import pytest
 import faults
 
 SLICE = {
-    "kills": 2,
-    "full-disks": 2,
+    "kills": 1,
+    "late-kills": 1,
+    "full-disks": 1,
     "caches": 2,
     "mounts": 4,
     "meshes": 25,
