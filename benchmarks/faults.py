@@ -42,7 +42,6 @@ Generator = np.random.Generator
 MESH_FORMATS = (".vtu", ".vtk", ".vtkhdf", ".inp", ".msh", ".bdf", ".e", ".npz", ".svg", ".obj", ".ply", ".dxf")
 COMMAND = [sys.executable, "-m", "imgquad_mesh"]
 MOST_SECONDS = 300
-LEAST_SIDE = 0.0  #: px, of a quad
 
 
 def path() -> str:
@@ -378,8 +377,7 @@ def judged(labels: np.ndarray, options: MeshOptions) -> Run:
     if options.periodic != "none":
         invariants.assert_opposite_sides_match(made.pixel_mesh, options.periodic, made.boundary.shape)
         assert_tied_where_whole(made, options.periodic)
-    shortest = invariants.shortest_side(made.pixel_mesh)
-    assert shortest >= LEAST_SIDE, f"a side of {shortest:.2g} px"
+    invariants.assert_sides_long(made.pixel_mesh)
     return made
 
 

@@ -18,7 +18,7 @@ from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.model import VOID, LabelImage, QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import run
-from support.invariants import assert_accounted, assert_simplified_mesh, assert_valid_mesh
+from support.invariants import assert_accounted, assert_sides_long, assert_simplified_mesh, assert_valid_mesh
 from support.labels import KINDS, Labels, label_image, labels_of_kind, spiral, voronoi
 
 SIZES = (1.0, 2.5, 6.0)
@@ -100,6 +100,12 @@ def test_turned_mirrored_and_recoloured_pictures_do_too(
 )
 def test_extremes(labels: Any, size: float, triangulator: str) -> None:
     valid_mesh(label_image(labels), size, triangulator=triangulator)
+
+
+@settings(bounded, max_examples=40)
+@given(pictures(), st.sampled_from(SIZES), st.sampled_from(sorted(EFFORTS)), st.sampled_from(("none", "x", "xy")))
+def test_no_side_is_shorter_than_is_promised(labels: Labels, size: float, effort: str, periodic: str) -> None:
+    assert_sides_long(run(label_image(labels), MeshOptions(size=size, effort=effort, periodic=periodic)).pixel_mesh)
 
 
 @st.composite

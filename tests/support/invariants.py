@@ -18,6 +18,7 @@ from imgquad_core.picture.selection import material_number
 from imgquad_core.pipeline import Run
 
 Array = NDArray[Any]
+LEAST_SIDE = 0.001  #: px, of a quad, at sizes from 1 px on; the shortest of the campaign was five times as long
 _PIXELS = 10**6  # looked at at once
 
 
@@ -76,10 +77,11 @@ def _edges_at(mesh: QuadMesh, axis: int, level: int) -> Array:
     return np.sort(mesh.points[ends, 1 - axis], axis=1)
 
 
-def shortest_side(mesh: QuadMesh) -> float:
-    """Length of the shortest side of a quad."""
-    start, end = _half_edges(mesh.quads)
-    return float(np.linalg.norm(mesh.points[start] - mesh.points[end], axis=1).min())
+def assert_sides_long(pixel_mesh: QuadMesh) -> None:
+    """Fail if a side of a quad is shorter than is promised."""
+    start, end = _half_edges(pixel_mesh.quads)
+    shortest = np.linalg.norm(pixel_mesh.points[start] - pixel_mesh.points[end], axis=1).min()
+    assert shortest >= LEAST_SIDE, f"a side of {shortest:.2g} px"
 
 
 def quad_areas(points: Array, quads: Array) -> Array:
