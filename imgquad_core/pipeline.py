@@ -27,7 +27,7 @@ from .boundary import (
     smooth_boundaries,
     true_shape,
 )
-from .errors import InputError
+from .errors import InputError, TopologyError
 from .frozen import FrozenMapping
 from .geometry.corner_rule import corner_rule
 from .jit import share_on_disk
@@ -338,14 +338,15 @@ def fill_boundaries(
     turn = turn_of_graph(boundary)
     graph = turn.graph(boundary)
     mesh = mesh_boundaries(graph, options, materials, told)
-    for attempt in range(_MATCHES if periodic != "none" else 0):
-        again = rematch(graph, mesh, turn.directions(periodic))
-        if again is None:
-            break
-        if attempt >= _MATCHES // 2:  # only what must be cut is: wishes of both sides may go on and on
+    rounds = 0
+    while periodic != "none" and (again := rematch(graph, mesh, turn.directions(periodic))) is not None:
+        if rounds == _MATCHES:
+            raise TopologyError(f"opposite sides of the cell differ after {rounds} rounds in which they were cut alike")
+        if rounds >= _MATCHES // 2:  # only what must be cut is: wishes of both sides may go on and on
             options = replace(options, tuning=options.tuning._replace(wishes=0))
         graph, mesh = again, mesh_boundaries(again, options, materials)
         boundary = turn.graph_back(graph)
+        rounds += 1
     return boundary, turn.mesh_back(mesh, boundary.shape)
 
 

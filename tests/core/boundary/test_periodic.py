@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from imgquad_core import pipeline
 from imgquad_core.boundary.areas import enclosed_areas
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.fe.cohesive import split_interfaces
@@ -23,6 +24,7 @@ from imgquad_core.writers import write_mesh
 from support import naive
 from support.ccx import needs_ccx, solve
 from support.handmade import staircase
+from support.labels import label_image
 
 
 def wrapped_disks(seed: int, n: int = 96, count: int = 12) -> NDArray[np.int32]:
@@ -95,6 +97,12 @@ def test_edges_that_the_mesher_cut_are_cut_alike_on_both_sides_not_where_it_left
     at = [graph.points[graph.chain(c)] for c in np.flatnonzero(outer)]
     heights = [np.unique(np.concatenate([p[:, 1] for p in at if (p[:, 0] == x).all()])) for x in (0.0, 160.0)]
     assert np.array_equal(*heights)
+
+
+def test_sides_that_never_match_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pipeline, "rematch", lambda graph, *_: graph)
+    with pytest.raises(TopologyError, match="opposite sides of the cell differ after 8 rounds"):
+        run(label_image([[0, 1], [1, 0]]), MeshOptions(size=1.0, periodic="x"))
 
 
 def test_sides_of_which_a_material_was_dropped_match_where_both_are_meshed() -> None:
