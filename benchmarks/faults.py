@@ -151,7 +151,7 @@ for _ in range(20):
         os.dup2(said, 2)
         os._exit(main(arguments))
     number = int(rng.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT]))
-    time.sleep(rng.uniform(0.0, 1.2) * lasts)
+    time.sleep(0.05 + rng.uniform(0.0, 1.2) * lasts)  # it handles signals by then
     os.kill(child, number)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     assert code in (0, -number, 128 + number), (number, code, Path("said").read_text())
@@ -374,6 +374,8 @@ def judged(labels: np.ndarray, options: MeshOptions) -> Run:
     judge(made.mesh, made.labels, pixel_size=options.pixel_sides)
     invariants.assert_accounted(made)
     invariants.assert_areas_of_boundary(made)
+    if not options.tolerance and options.periodic == "none" and len(set(options.pixel_sides)) == 1:
+        invariants.assert_areas_of_pixels(made)
     if options.periodic != "none":
         invariants.assert_opposite_sides_match(made.pixel_mesh, options.periodic, made.boundary.shape)
         assert_tied_where_whole(made, options.periodic)

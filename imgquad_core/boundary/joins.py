@@ -162,7 +162,7 @@ def _join_all(
             x, y = best_place(net, c, star, n, shortest, farthest, along)
             if np.isnan(x):
                 continue
-            reach = best_reach(net, grid, chain, c, star, n, x, y, shortest, reaches, cut, best_cut)
+            reach = best_reach(net, grid, chain, c, star, n, x, y, shortest, 2.0 * farthest, reaches, cut, best_cut)
             if reach > 0.0:
                 _join(net, c, star, n, x, y, reach, best_cut)
                 into[c] = net.node[c, 0]

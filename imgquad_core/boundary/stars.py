@@ -191,6 +191,7 @@ def best_reach(
     x: float,
     y: float,
     shortest: float,
+    aside: float,
     reaches: Floats,
     cut: Ints,
     best_cut: Ints,
@@ -200,7 +201,7 @@ def best_reach(
     covers = max(_gone_from(net, net.node[c, 0], x, y), _gone_from(net, net.node[c, 1], x, y)) + _BEYOND
     for factor in reaches:
         reach = factor * covers
-        if not _cut_spokes(net, star, n, x, y, reach, cut) or not _is_free(
+        if not _cut_spokes(net, star, n, x, y, reach, aside, cut) or not _is_free(
             net, grid, chain, c, star, n, x, y, reach, shortest
         ):
             continue
@@ -213,7 +214,7 @@ def best_reach(
 
 
 @verb
-def _cut_spokes(net: Net, star: Ints, n: int, x: float, y: float, reach: float, cut: Ints) -> bool:
+def _cut_spokes(net: Net, star: Ints, n: int, x: float, y: float, reach: float, aside: float, cut: Ints) -> bool:
     """Find the last point of each chain within reach, before it leaves twice the reach."""
     for k in range(n):
         c, side = star[k] // 2, star[k] % 2
@@ -222,21 +223,48 @@ def _cut_spokes(net: Net, star: Ints, n: int, x: float, y: float, reach: float, 
         cut[k] = i
         # a spoke that is there already may be longer, within the disc that is free
         found = (end - i) * step >= 0 and np.hypot(net.raw[i, 0] - x, net.raw[i, 1] - y) <= 2.0 * reach
-        while (end - i) * step >= 0:
+        stays = True
+        while stays and (end - i) * step >= 0:
             d2 = (net.raw[i, 0] - x) ** 2 + (net.raw[i, 1] - y) ** 2
-            if d2 > 4.0 * reach * reach:
-                break
+            stays = d2 <= 4.0 * reach * reach
             if d2 <= reach * reach:
                 cut[k] = i
                 found = True
             i += step
         far = net.node[c, 1 - side]
-        if np.hypot(net.place[far, 0] - x, net.place[far, 1] - y) <= max(reach, 1e-6):
+        # one that leaves and comes back goes around something, which would be lost
+        if stays and np.hypot(net.place[far, 0] - x, net.place[far, 1] - y) <= max(reach, 1e-6):
             cut[k] = end + step  # straight to its other end
             found = True
-        if not found:
+        if not found or _goes_around(net, star[k], cut[k], x, y, aside):
             return False
     return True
+
+
+@verb
+def _goes_around(net: Net, s: int, cut: int, x: float, y: float, aside: float) -> bool:
+    """Whether the points that a spoke from (x, y) leaves out are farther from it than `aside`.
+
+    Then they go around a cave or a cape, which would be lost::
+
+             .--.
+            |    |
+        q---.    .---
+    """
+    c, side = s // 2, s % 2
+    step = 1 - 2 * side
+    i, far = net.kept[c, side], net.node[c, 1 - side]
+    to_end = (net.kept[c, 1 - side] - cut) * step < 0
+    px = (net.place[far, 0] if to_end else net.raw[cut, 0]) - x
+    py = (net.place[far, 1] if to_end else net.raw[cut, 1]) - y
+    square = max(px * px + py * py, 1e-12)
+    while (cut - i) * step > 0:
+        dx, dy = net.raw[i, 0] - x, net.raw[i, 1] - y
+        share = min(max((dx * px + dy * py) / square, 0.0), 1.0)
+        if np.hypot(dx - share * px, dy - share * py) > aside:
+            return True
+        i += step
+    return False
 
 
 @verb

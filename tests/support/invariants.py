@@ -60,6 +60,13 @@ def assert_areas_of_boundary(done: Run) -> None:
     assert np.allclose(found, enclosed_areas(done.boundary), rtol=1e-9, atol=1e-9)
 
 
+def assert_areas_of_pixels(done: Run) -> None:
+    """Fail unless each region of 50 pixels or more has the area of its pixels, to 2 %."""
+    pixels = done.boundary.region_pixels
+    error = np.abs(enclosed_areas(done.boundary) / pixels - 1.0)[pixels >= 50]
+    assert error.max(initial=0.0) < 0.02, f"a region is off by {error.max():.1%} of its area"
+
+
 def assert_opposite_sides_match(mesh: QuadMesh, directions: str, shape: tuple[int, int]) -> None:
     """Fail if a node of one side of a picture of `shape` lies within an edge of the opposite side."""
     for axis in map("xy".index, directions):

@@ -7,12 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from imgquad_core import MeshOptions, mesh_image
+from imgquad_core.boundary.areas import enclosed_areas
 from imgquad_core.boundary.curves import pixel_chains
 from imgquad_core.boundary.extraction import extract_boundaries
 from imgquad_core.boundary.joins import join_short_chains
 from imgquad_core.boundary.options import SmoothingOptions
 from imgquad_core.boundary.smoothing import smooth_boundaries
-from imgquad_core.model import BoundaryGraph, PointKind
+from imgquad_core.model import VOID, BoundaryGraph, PointKind
 from support.labels import any_labels, label_image, voronoi
 from support.planar import check_meshable, check_planar
 
@@ -95,3 +96,23 @@ def test_a_side_of_the_border_between_two_corners_stays_there() -> None:
     mesh = mesh_image(np.array([[0], [2]], np.int32), MeshOptions(size=1.0, step=2.6, effort="fast"))
     assert mesh.points.min(axis=0).tolist() == [0.0, 0.0]
     assert mesh.points.max(axis=0).tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize("depth", [1, 3, 5, 7, 12])
+@pytest.mark.parametrize("width", [1, 3, 7])
+@pytest.mark.parametrize("neck", [1, 3])
+def test_a_cave_beside_a_join_is_not_walled_up(neck: int, width: int, depth: int) -> None:
+    """A spoke to the last point within reach left the cave out, and the region got its area in silence."""
+    labels = np.zeros((24, 24), np.int32)
+    labels[11, 24 - neck :] = VOID
+    labels[11 - width // 2 : 12 + width // 2, 24 - neck - depth : 24 - neck] = VOID
+    labels[13:, 23] = VOID  # one pixel of the border lies between
+    smooth = smooth_boundaries(extract_boundaries(label_image(labels)))
+    assert np.abs(enclosed_areas(smooth) - smooth.region_pixels).max() < 1.5
+
+
+def test_an_island_in_a_cave_stays_in_it() -> None:
+    labels = np.zeros((16, 16), np.int32)
+    labels[2:9, 3:10] = labels[5, 3:] = labels[7:, 15] = VOID
+    labels[3, 4] = 0
+    assert mesh_image(label_image(labels)).n_quads > 0  # the outline without the cave had the island inside
