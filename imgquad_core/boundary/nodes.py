@@ -265,11 +265,13 @@ def on_stride(nodes: Nodes, step: int) -> Strided:
 def mark_conflicts(
     points: Floats, strided: Strided, ends: Ends, is_new: Flags, gently: bool, shape: tuple[float, float], units: float
 ) -> Bytes:
-    """Mark the segments that cross or touch; `gently` also those too close or at too sharp sectors.
+    """Mark the segments that cross, touch or leave the picture; `gently` also those too close or at too sharp sectors.
 
     Only pairs with a segment on a chain of `is_new` are tested for the former.
     """
     marks = find_conflicts(points, strided.segments, strided.chain, is_new, shape, units)
+    beyond = np.abs(2.0 * points - shape[::-1]) > np.array(shape[::-1]) + 4.0 / units  # rounded to steps of the grid
+    marks[beyond.any(axis=1)[strided.segments].any(axis=1)] = CROSSING  # past void nothing else is crossed
     if gently:
         mark_sectors(points, strided, ends, marks)
     else:

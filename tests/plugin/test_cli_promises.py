@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -251,6 +252,19 @@ def test_whatever_an_interrupt_makes_libraries_raise_is_an_interrupt(
     monkeypatch.setattr("imgquad_mesh.cli.run._run", broken)
     assert main(["run", "rock.png", "m.vtu"]) == 128 + signal.SIGTERM
     assert capsys.readouterr().err.strip() == "imgquad-mesh: error: interrupted"
+
+
+def test_an_interrupt_that_python_drops_comes_again(capfd: pytest.CaptureFixture[str]) -> None:
+    class Thing:
+        pass
+
+    thing = Thing()
+    noted = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt), handling_signals():  # noqa: PT012
+        del thing  # an exception of the callback is printed, and gone
+        time.sleep(5)
+    assert noted() is None
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_nohup_is_respected() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -31,12 +32,23 @@ class Interruption:
         """Note the signal and raise; libraries that load crash, or lose the exception, where it comes in between."""
         self.signal = self.signal or number
         if _is_importing(frame):
-            again = threading.Timer(LATER, signal.raise_signal, [number])
-            again.daemon = True
-            again.start()
+            self._again()
         elif monotonic() - self._raised >= AGAIN:
             self._raised = monotonic()
             raise KeyboardInterrupt
+
+    def lost(self, what: sys.UnraisableHookArgs) -> None:
+        """Let the signal come again where Python drops its exception, as in callbacks of weak references."""
+        if issubclass(what.exc_type, KeyboardInterrupt) and self.signal is not None:
+            self._raised = -AGAIN
+            self._again()
+        else:
+            sys.__unraisablehook__(what)
+
+    def _again(self) -> None:
+        again = threading.Timer(LATER, signal.raise_signal, [self.signal])
+        again.daemon = True
+        again.start()
 
 
 @contextmanager
@@ -48,9 +60,11 @@ def handling_signals() -> Iterator[Interruption]:
         for number in SIGNALS:
             if signal.getsignal(number) != signal.SIG_IGN:
                 former[number] = signal.signal(number, interruption.handle)
+    hook, sys.unraisablehook = sys.unraisablehook, interruption.lost
     try:
         yield interruption
     finally:
+        sys.unraisablehook = hook
         for number, handler in former.items():
             signal.signal(number, handler)
 

@@ -116,3 +116,10 @@ def test_an_island_in_a_cave_stays_in_it() -> None:
     labels[2:9, 3:10] = labels[5, 3:] = labels[7:, 15] = VOID
     labels[3, 4] = 0
     assert mesh_image(label_image(labels)).n_quads > 0  # the outline without the cave had the island inside
+
+
+def test_a_border_of_void_stays_in_the_picture_where_the_border_beside_it_is_joined_away() -> None:
+    options = MeshOptions(size=2.5, effort="fast", drop=(0,), pixel_size=(0.4, 3.0))
+    mesh = mesh_image(label_image([[1], [0]]), options)  # its left side ends in the upper corner
+    assert mesh.points.min() >= 0
+    assert (mesh.points <= np.array([0.4, 6.0]) + 1e-9).all()
