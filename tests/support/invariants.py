@@ -18,7 +18,7 @@ from imgquad_core.picture.selection import material_number
 from imgquad_core.pipeline import Run
 
 Array = NDArray[Any]
-LEAST_SIDE = 0.001  #: px, of a quad, at sizes from 1 px on; the shortest of the campaign was five times as long
+LEAST_SIDE = 0.001  #: px, of a quad, at sizes from 1 px on, but for periodic cells; the campaign's shortest was .0048
 _PIXELS = 10**6  # looked at at once
 
 
