@@ -11,6 +11,7 @@ width grows away from it along the chain::
                        '.___.'
     samples   o     o    o o.....o o    o     o
 
+A chain that bends to and fro within the bell is not foreign to itself there: such tips are what smoothing takes.
 Points go at most half-way to foreign parts. Where the new chain is farther off than that all the same, where it
 crosses others, leaves a node in another order or turns a region inside out, the width is halved, until it does not: so
 thin parts stay as they are, and what is wide is smoothed beside them.
@@ -47,6 +48,7 @@ _WIDENS = 0.5  # of the width, a unit of length along the chain
 _ROOM = 0.49  # of the distance to foreign parts: two points that both go that far do not meet
 _ARC_RATIO = 2.0  # arc over distance of a foreign point
 _THIN = 3.0  # the same where a narrower bell is needed: chains that meet at more than 39 degrees are not thin
+_WIGGLE = 4.0  # widths of a chain that the bell may take together: a tip or a bend to and fro is not a thin part
 _ROUNDS = 12  # of halving widths; afterwards whole chains keep their pixels
 
 
@@ -70,8 +72,9 @@ def averaged(chains: PixelChains, width: float, units: Floats | float, threads: 
         The same chains, coordinates and picture divided by `width`.
     """
     curves, ends = curves_of(*chains)
-    room = _ROOM * local_feature_size(curves.raw, curves, _REACH * width, _ARC_RATIO, threads=threads)
-    thin = local_feature_size(curves.raw, curves, _REACH * width, _THIN, threads=threads)
+    reach, wiggle = _REACH * width, _WIGGLE * width
+    room = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO, wiggle=wiggle, threads=threads)
+    thin = local_feature_size(curves.raw, curves, reach, _THIN, wiggle=wiggle, threads=threads)
     scale = _graded(curves, np.minimum(_widest(chains.graph, curves, width), _OF_FREE * thin))
     new = np.ones(len(curves.ends), bool)
     for attempt in range(_ROUNDS + 2):

@@ -34,7 +34,13 @@ class Buckets(NamedTuple):
 
 
 def local_feature_size(
-    points: Floats, curves: Curves, reach: float, bend: float, corner: Ints | None = None, threads: int = 1
+    points: Floats,
+    curves: Curves,
+    reach: float,
+    bend: float,
+    corner: Ints | None = None,
+    wiggle: float = 0.0,
+    threads: int = 1,
 ) -> Floats:
     """Distance to the nearest foreign point of the boundary.
 
@@ -50,6 +56,8 @@ def local_feature_size(
         Arc over distance from which a point is foreign.
     corner : int64, shape (n,), optional
         Corner that each point is beside, -1 for none: both sides of one corner are not foreign to each other.
+    wiggle : float
+        Arc along one chain below which its points are not foreign to each other, however near they are.
     threads : int
         How many share the points.
 
@@ -65,7 +73,7 @@ def local_feature_size(
     while True:
         ids = np.arange(len(points)) if stride == 1 else _every(curves.offsets, stride)
         buckets = bucket(points, ids, max(level / 2, 1.0))
-        for_part = partial(_nearest_foreign, points, curves, chain, corner, buckets, level, bend, lfs)
+        for_part = partial(_nearest_foreign, points, curves, chain, corner, buckets, level, bend, wiggle, lfs)
         in_threads([ids[part] for part in even_parts(np.ones(len(ids), np.int64), threads)], for_part, threads)
         if stride > 1:
             _spread(ids, stride, chain, lfs)
@@ -118,6 +126,7 @@ def _nearest_foreign(
     buckets: Buckets,
     reach: float,
     bend: float,
+    wiggle: float,
     lfs: Floats,
     ids: Ints,
 ) -> None:
@@ -144,7 +153,8 @@ def _nearest_foreign(
                         d2 = (points[j, 0] - x) ** 2 + (points[j, 1] - y) ** 2
                         if d2 >= best or (corner[i] >= 0 and corner[i] == corner[j]):
                             continue
-                        if _arc_between(curves, chain[i], i, chain[j], j) > bend * np.sqrt(d2):
+                        arc = _arc_between(curves, chain[i], i, chain[j], j)
+                        if arc > bend * np.sqrt(d2) and (chain[i] != chain[j] or arc > wiggle):
                             best = d2
                             found = True
         if found:

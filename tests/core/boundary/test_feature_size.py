@@ -17,14 +17,17 @@ def curves(labels: Labels) -> Curves:
     return curves_of(extract_boundaries(label_image(labels)))[0]
 
 
-def all_pairs(c: Curves, reach: float, bend: float, corner: Ints | None = None) -> Floats:
+def all_pairs(c: Curves, reach: float, bend: float, corner: Ints | None = None, wiggle: float = 0.0) -> Floats:
     n = len(c.raw)
     lfs = np.full(n, np.inf)
+    chain = np.repeat(np.arange(len(c.ends)), np.diff(c.offsets))
     for i in range(n):
         apart = np.hypot(*(c.raw - c.raw[i]).T)
         for j in np.flatnonzero(apart < reach):
             same = corner is not None and corner[i] >= 0 and corner[i] == corner[j]
-            if not same and naive.arc_between(c, i, j) > bend * apart[j]:
+            arc = naive.arc_between(c, i, j)
+            same |= chain[i] == chain[j] and arc <= wiggle
+            if not same and arc > bend * apart[j]:
                 lfs[i] = min(lfs[i], apart[j])
     return lfs
 
@@ -51,6 +54,14 @@ def test_both_sides_of_one_corner_are_not_foreign() -> None:
     assert np.array_equal(np.isinf(found), np.isinf(true))
     assert (found >= local_feature_size(c.raw, c, 4.0, 2.0)).all()
     assert (found != local_feature_size(c.raw, c, 4.0, 2.0)).any()
+
+
+def test_a_chain_is_not_foreign_to_what_it_has_just_left() -> None:
+    c = curves(spiral(13))
+    found, true = local_feature_size(c.raw, c, 4.0, 2.0, wiggle=12.0), all_pairs(c, 4.0, 2.0, wiggle=12.0)
+    assert np.array_equal(np.isinf(found), np.isinf(true))
+    assert np.allclose(found[np.isfinite(true)], true[np.isfinite(true)], rtol=1e-12)
+    assert (true != all_pairs(c, 4.0, 2.0)).any()
 
 
 @pytest.mark.parametrize("width", [3, 11, 25])

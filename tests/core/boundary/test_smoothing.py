@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from skimage.draw import polygon2mask
 
 from imgquad_core.boundary import withdrawal
 from imgquad_core.boundary.areas import enclosed_areas, restore_areas
@@ -211,6 +212,17 @@ def test_regions_of_fifty_pixels_keep_their_areas(size: float) -> None:
     error = np.abs(enclosed_areas(graph) - graph.region_pixels) / graph.region_pixels
     assert large.sum() > 40
     assert error[large].max() < 1e-3
+
+
+@pytest.mark.parametrize("bend", [((52, 88), (60, 78)), ((52, 86), (62, 80))])
+def test_a_tolerance_smooths_bends_to_and_fro(bend: tuple[tuple[int, int], ...]) -> None:
+    #  ________        two tips of 40 to 60 degrees, of one chain
+    #         /_____
+    outline = [(52, -5), *bend, (bend[1][0], 165), (130, 165), (130, -5)]  # row, column
+    labels = polygon2mask((120, 160), outline).astype(np.int32)
+    graph = smooth_boundaries(extract_boundaries(label_image(labels)), SmoothingOptions(16.0, tolerance=16.0))
+    check_planar(graph, 1)
+    assert naive.lengths(graph.points, graph.segments).min() > 8.0
 
 
 def test_no_point_moves_farther_than_allowed() -> None:
