@@ -11,7 +11,7 @@ from .picture import sizes_by_number, widest_part
 from .pipeline import Run
 
 MUCH, MATTERS = 0.5, 0.01  #: share of a material that is lost, and of the picture that it had, from which it is told
-_REMEDIES = "remove noise (min-pixels, min-length), ask for a smaller size or raise the tolerance"
+_REMEDIES = "remove noise (min-pixels, min-length), ask for a smaller size or for another tolerance"
 _FIRST_REMEDY = (
     "remove noise (min-pixels, min-length), ask for a smaller size, set tolerance {:g} (half the size), which gives "
     "what is thinner to its neighbours"
