@@ -17,10 +17,10 @@ def used():
 
 if sys.argv[1] == "back":
     give_large_blocks_back()
-np.ones(2_000_000)  # 16 MB: glibc takes blocks up to this size for small ones from here on
+np.ones(3_000_000)  # 24 MB: glibc takes smaller blocks for small ones from here on
 before = used()
-blocks = [np.ones(2_000_000) for _ in range(8)]
-last = np.ones(10_000)  # stands behind them
+blocks = [np.ones(1_000_000) for _ in range(10)]
+last = [np.ones(10_000) for _ in range(100)]  # some stand behind them
 del blocks
 print(used() - before)
 """
@@ -34,4 +34,4 @@ def test_large_blocks_go_back_to_the_system() -> None:
         )
         for how in ("back", "as it is")
     }
-    assert kept["back"] < 10e6 < kept["as it is"]
+    assert kept["back"] < 20e6 < kept["as it is"]
