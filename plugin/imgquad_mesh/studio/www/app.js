@@ -120,7 +120,7 @@ async function perform(task) {
 function busy(is) {
   at("cancel").hidden = at("progress").hidden = !is;
   at("stage").textContent = is ? STAGES.start : "";
-  if (is) at("progress").removeAttribute("value");
+  at("progress").value = 0; // without a value the bar moves all the time, which takes the work half a core
   document.body.toggleAttribute("data-busy", is);
 }
 
