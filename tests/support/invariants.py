@@ -33,6 +33,7 @@ def assert_valid_mesh(mesh: QuadMesh, image: LabelImage, *, pixel_size: Lengths 
     assert_convex(points, mesh.quads)
     assert_conforming(mesh)
     assert_constraints(mesh, points, (cols, rows))
+    assert_within(points, (cols, rows), pixel_size)
     assert_topology(mesh, image)
     assert_materials(mesh, points, image)
 
@@ -45,11 +46,18 @@ def assert_simplified_mesh(mesh: QuadMesh, labels: LabelImage, *, pixel_size: Le
     assert_convex(points, mesh.quads)
     assert_conforming(mesh)
     assert_constraints(mesh, points, (cols, rows))
+    assert_within(points, (cols, rows), pixel_size)
     assert_topology(mesh, labels)
     solid = labels.labels != VOID
     assert np.array_equal(np.unique(mesh.quad_material), np.unique(labels.labels[solid]))
     if solid.all():
         assert np.isclose(quad_areas(points, mesh.quads).sum(), solid.size, rtol=1e-9)
+
+
+def assert_within(points: Array, extent: tuple[int, int], pixel_size: Lengths) -> None:
+    """No point lies beyond the border; only what was divided by a length other than 1 may be off, by rounding."""
+    room = 0.0 if np.all(np.equal(pixel_size, 1.0)) else 1e-12
+    assert (points <= np.multiply(extent, 1.0 + room)).all()
 
 
 def assert_areas_of_boundary(done: Run) -> None:
@@ -167,9 +175,6 @@ def assert_constraints(mesh: QuadMesh, points: Array, extent: tuple[float, float
     frame = points[mesh.point_kind == PointKind.FRAME]
     assert (np.isclose(frame, 0) | np.isclose(frame, extent)).any(axis=1).all(), "FRAME point off the border"
     assert points.min() >= 0
-    assert (points <= np.multiply(extent, 1 + 1e-12)).all(), (
-        "a point beyond the border"
-    )  # lengths of pixels are rounded
 
 
 def assert_topology(mesh: QuadMesh, image: LabelImage) -> None:

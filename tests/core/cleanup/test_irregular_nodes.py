@@ -163,7 +163,7 @@ def test_searches_that_are_left_out_would_have_been_in_vain(
         differ.append(len(one.quads) != len(mesh.quads))
         for a, b in zip(one, other, strict=True):
             np.testing.assert_array_equal(a, b)
-    assert any(differ)
+    assert differ[0]  # of the second one, of triangles by CDT, nothing can be made better
 
 
 def test_no_mesh_of_a_face_is_less_irregular_than_its_memory_tells() -> None:
