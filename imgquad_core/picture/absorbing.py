@@ -15,6 +15,7 @@ are given places by their local density first, each with a weight that leaves it
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -34,6 +35,7 @@ from .rounding import BELL_ENDS, rounded
 FINEST = 6.0  #: px; with a smaller tolerance the picture is enlarged first: discs of 1 or 2 px eat the stairs
 MOST_TIMES = 3  #: as wide
 ROUNDS = 6
+SPREAD, RIM = 2.0, 4.0  # radii around what is thin: room for further rounds, and around that, which they look at
 CORNER = 2.0  # radii from a core that stay
 BLUNT = 0.5  # width of the bell over the radius, where outlines are rounded
 SPECKS, FAR = 0.02, 0.75  # share of the picture that is farther than that many tolerances from what stays: it is noisy
@@ -128,37 +130,81 @@ def areas_of_origin(before: Labels, after: Labels, rule: int) -> Floats:
         to their rests, by overlap; where nothing is left of one, its pixels count for the regions that they are in.
     """
     old = roots_of(labelled_clusters(before, rule))
+    new = roots_of(labelled_clusters(after, rule))
     solid = after.ravel() != VOID
-    first, region = np.unique(roots_of(labelled_clusters(after, rule))[solid], return_inverse=True)
+    is_first = solid & (new == np.arange(new.size))
+    region = (np.cumsum(is_first) - 1)[new[solid]]
     same = solid & (before == after).ravel()
     total = np.bincount(old[solid], minlength=len(old))
     rest = np.bincount(old[same], minlength=len(old))
     share = np.where(same, (total / np.maximum(rest, 1))[old], np.where(rest[old] == 0, 1.0, 0.0))
-    areas = np.bincount(region, share[solid], len(first))
-    pixels = np.bincount(region, minlength=len(first))
+    areas, pixels = np.bincount(region, share[solid]), np.bincount(region)
     return np.asarray(np.maximum(areas, 0.5 * pixels))
 
 
 def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[Labels, bool]:
-    """Absorb what is thin; also tell whether the picture is noisy."""
-    is_noisy = False
-    for attempt in range(ROUNDS):
-        kept = _kept(labels, stays, radius, rule)
-        if kept.all() or not (kept & (labels != VOID)).any():
-            break
-        new, gone = flood(labels, kept)
-        stays = stays | (~kept & (gone == 0.0))  # between void pixels, with nothing in reach that is kept
-        if attempt == 0 and np.mean(gone > FAR * 2.0 * radius) > SPECKS:
-            is_noisy = True
-            labels = _balanced(labels, stays, radius)
-            kept = _kept(labels, stays, radius, rule)
-            if kept.all() or not (kept & (labels != VOID)).any():
-                break
-            new, _ = flood(labels, kept)
-        labels = rounded(new, (new != labels) & ~stays, stays, radius, BLUNT * radius)
-    else:  # what the last rounding left thin may not be seen in the picture that is not enlarged
-        labels, _ = flood(labels, _kept(labels, stays, radius, rule))
+    """Absorb what is thin; also tell whether the picture is noisy.
+
+    The first round works on the whole picture. What it leaves thin are a few spots: each goes on in its window.
+    """
+    new, stays, gone = _flooded(labels, stays, radius, rule)
+    if not gone.any():
+        return labels, False
+    is_noisy = bool(np.mean(gone > FAR * 2.0 * radius) > SPECKS)
+    if is_noisy:
+        labels = _balanced(labels, stays, radius)
+        new, stays, _ = _flooded(labels, stays, radius, rule)
+    labels = rounded(new, (new != labels) & ~stays, stays, radius, BLUNT * radius)
+    rim = int(np.ceil(RIM * radius))
+    for window in _windows(~_kept(labels, stays, radius, rule), rim + int(np.ceil(radius * max(SPREAD, radius)))):
+        held = stays[window] | _rim(window, labels.shape, rim)
+        labels[window] = _settled(labels[window].copy(), held, radius, rule)
     return labels, is_noisy
+
+
+def _settled(labels: Labels, stays: Flags, radius: float, rule: int) -> Labels:
+    """Absorb until nothing is thin, or for some rounds."""
+    for _ in range(ROUNDS - 1):
+        new, stays, gone = _flooded(labels, stays, radius, rule)
+        if not gone.any():
+            return labels
+        labels = rounded(new, (new != labels) & ~stays, stays, radius, BLUNT * radius)
+    # what the last rounding left thin may not be seen in the picture that is not enlarged
+    return _flooded(labels, stays, radius, rule)[0]
+
+
+def _flooded(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[Labels, Flags, Floats]:
+    """Flood what is thin; also tell what stays from now on, and how far each pixel is from what is kept."""
+    kept = _kept(labels, stays, radius, rule)
+    if kept.all() or not (kept & (labels != VOID)).any():
+        return labels, stays, np.zeros(labels.shape)
+    new, gone = flood(labels, kept)
+    return new, stays | (~kept & (gone == 0.0)), gone  # between void pixels, with nothing in reach that is kept
+
+
+def _windows(flags: Flags, margin: int) -> Iterator[tuple[slice, slice]]:
+    """Yield windows with a margin around flagged pixels, one for those that are near each other."""
+    side = 2 * margin
+    cells = np.zeros([-(-n // side) for n in flags.shape], bool)
+    cells[tuple(at // side for at in np.nonzero(flags))] = True
+    for box in scipy.ndimage.find_objects(scipy.ndimage.label(cells, np.ones((3, 3)))[0]):
+        wide = tuple(slice(side * along.start, side * along.stop) for along in box)
+        rows, cols = (
+            slice(max(along.start + at.min() - margin, 0), along.start + at.max() + 1 + margin)
+            for along, at in zip(wide, np.nonzero(flags[wide]), strict=True)
+        )
+        yield rows, cols
+
+
+def _rim(window: tuple[slice, slice], shape: tuple[int, ...], width: int) -> Flags:
+    """Flag the rim of a window, but where the picture ends: what is near is not known there."""
+    inside = tuple(
+        slice(width if along.start else 0, -width if along.stop < n else None)
+        for along, n in zip(window, shape, strict=True)
+    )
+    flags = np.ones([min(along.stop, n) - along.start for along, n in zip(window, shape, strict=True)], bool)
+    flags[inside] = False
+    return flags
 
 
 def _kept(labels: Labels, stays: Flags, radius: float, rule: int) -> Flags:
@@ -199,7 +245,7 @@ def _accounts(before: Labels, after: Labels, times: int, options: AbsorbOptions)
     stays = (before == after).ravel() & (before != VOID).ravel()
     is_left = np.zeros(before.size, bool)
     is_left[root[stays]] = True
-    first = np.unique(root[(before != VOID).ravel()])
+    first = np.flatnonzero((root == np.arange(root.size)) & (before != VOID).ravel())
     label = before.ravel()[first]
     rows = []
     for m in np.unique(label).tolist():

@@ -157,3 +157,15 @@ def test_ways_stay_in_their_region() -> None:
 def test_bad_tolerances_are_refused(tolerance: float) -> None:
     with pytest.raises(InputError, match="tolerance is"):
         AbsorbOptions(tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [2.0, 7.0])
+def test_what_is_absorbed_at_one_place_hangs_on_no_other(tolerance: float) -> None:
+    labels = np.full((140, 500), 99, np.int32)
+    places = [slice(left, left + 140) for left in (0, 183, 357)]
+    for place in places:
+        labels[40:100, place.start + 40 : place.start + 100] = voronoi(60, 60, 30, seed=3)
+    after = absorb_thin(label_image(labels), AbsorbOptions(tolerance)).image.labels
+    assert (after != labels).any()
+    for place in places[1:]:
+        assert np.array_equal(after[:, place], after[:, places[0]])
