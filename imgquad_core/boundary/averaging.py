@@ -52,7 +52,7 @@ _WIGGLE = 4.0  # widths of a chain that the bell may take together: a tip or a b
 _ROUNDS = 12  # of halving widths; afterwards whole chains keep their pixels
 
 
-def averaged(chains: PixelChains, width: float, units: Floats | float, threads: int = 1) -> PixelChains:
+def averaged(chains: PixelChains, width: float, units: Floats | float, *, threads: int = 1) -> PixelChains:
     """Average chains over a width.
 
     Parameters

@@ -33,6 +33,7 @@ def edge_sizes(
     growth: float,
     edge_ratio: float,
     shape: tuple[float, float],
+    *,
     threads: int = 1,
 ) -> Floats:
     """Wanted length of final edges at each dense point.

@@ -39,6 +39,7 @@ def local_feature_size(
     reach: float,
     bend: float,
     corner: Ints | None = None,
+    *,
     wiggle: float = 0.0,
     threads: int = 1,
 ) -> Floats:

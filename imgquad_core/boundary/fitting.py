@@ -252,6 +252,7 @@ def fit_pieces(
     pieces: Ints,
     closed: Flags,
     windows: Floats,
+    *,
     threads: int = 1,
 ) -> Floats:
     """Smooth pieces of chains by local quadratics and, where windows are wide, quartics.

@@ -37,7 +37,7 @@ _ROUND = 2 * _BESIDE + 2
 _AHEAD = 0.6  # px that a corner may lie ahead of its point along a side: more would fold the curve
 
 
-def find_corners(curves: Curves, threads: int = 1) -> tuple[Curves, Flags]:
+def find_corners(curves: Curves, *, threads: int = 1) -> tuple[Curves, Flags]:
     """Find sharp corners; closed chains that have some are turned round to start at one.
 
     Parameters

@@ -87,10 +87,10 @@ def smooth_chains(
     chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step, barred)
     width = 0.5 * options.tolerance / true.unit
     if width > 1.0:
-        chains = averaged(chains, width, UNITS * np.array(step), threads)
+        chains = averaged(chains, width, UNITS * np.array(step), threads=threads)
         true = _TrueShape.of(graph.shape, shape, (step[0] * width, step[1] * width))
     curves, ends = curves_of(*chains)
-    curves, is_corner = find_corners(curves, threads)
+    curves, is_corner = find_corners(curves, threads=threads)
     is_seam = np.zeros(len(which), bool) if seams is None else seams[which]
     real = without_seams(curves, ends, is_seam)
     room = np.zeros(len(curves.raw))
@@ -168,7 +168,7 @@ def _wanted_sizes(draft: Draft, real: Real, growth: float, threads: int) -> Floa
     size, kept = draft.limit.copy(), real.kept
     size[kept] = edge_sizes(
         draft.smooth[kept], real.curves, draft.limit[kept], draft.is_corner[kept], growth, draft.edge_ratio,
-        draft.shape, threads,
+        draft.shape, threads=threads,
     )  # fmt: skip
     return size
 
@@ -177,7 +177,7 @@ def _room(curves: Curves, is_corner: Flags, max_shift: float, threads: int) -> F
     """How far smoothing may move each dense point."""
     reach = max(_NARROW, max_shift / _ROOM)
     corner = beside_corners(curves, is_corner)
-    free = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO, corner, threads)
+    free = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO, corner, threads=threads)
     return np.asarray(np.minimum(free, np.where(is_corner, 1.0, _SHARE) * max_shift * curves.scale))
 
 
@@ -187,7 +187,9 @@ def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats, thread
     place_corners(curves, is_corner, room, pinned)
     pin_ends(pinned, curves, node)
     pieces, closed = _pieces(curves, is_corner)
-    fitted = fit_pieces(pinned, curves.arc, curves.weight, curves.scale, pieces, closed, np.array(WINDOWS), threads)
+    fitted = fit_pieces(
+        pinned, curves.arc, curves.weight, curves.scale, pieces, closed, np.array(WINDOWS), threads=threads
+    )
     shift = fitted - curves.raw
     length = np.hypot(shift[:, 0], shift[:, 1])
     smooth: Floats = curves.raw + shift * np.minimum(1.0, room / np.maximum(length, 1e-300))[:, None]

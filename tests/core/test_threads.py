@@ -14,7 +14,7 @@ from imgquad_core.boundary import (
     smooth_boundaries,
 )
 from imgquad_core.threads import even_parts, in_threads, threads_of
-from support.labels import label_image, voronoi
+from support.labels import label_image, labels_of_kind, voronoi
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7])
@@ -38,11 +38,13 @@ def test_threads_that_are_asked_for_are_used() -> None:
     assert threads_of(0) >= 1
 
 
-def test_boundaries_are_the_same_for_any_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("kind", ["voronoi", "noise", "spiral", "arms"])
+def test_boundaries_are_the_same_for_any_number_of_threads(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for stage in (feature_size, fitting, sharp_corners):  # small parts, so that a small picture has many
         monkeypatch.setattr(stage, "even_parts", lambda points, threads: even_parts(points, threads, least=50))
-    graph = extract_boundaries(label_image(voronoi(120, 150, 25, 4)))
-    one, *others = (smooth_boundaries(graph, SmoothingOptions(size=3.0, threads=n)) for n in (1, 2, 5))
+    labels = voronoi(120, 150, 25, 4) if kind == "voronoi" else labels_of_kind(kind, 40, 50, 4, 7)
+    graph = extract_boundaries(label_image(labels))
+    one, *others = (smooth_boundaries(graph, SmoothingOptions(size=3.0, threads=n)) for n in (1, 2, 5, 16))
     for other in others:
         assert other.points.tobytes() == one.points.tobytes()
         assert other.chain_points.tobytes() == one.chain_points.tobytes()
