@@ -14,6 +14,8 @@ from imgquad_core.errors import InputError, ScriptError
 from imgquad_core.pipeline import mesh_image
 from imgquad_mesh.meshlab import pymeshlab_filters
 from imgquad_mesh.meshlab.layer import write_ply
+from imgquad_mesh.meshlab.meshsets import quad_layer
+from imgquad_mesh.meshlab.process import MeshLabError, MeshLabProcess
 from imgquad_mesh.meshlab.script import run_script
 from support.bad_scripts import BAD_ELEMENTS, BAD_FILES, BAD_MESHLAB, FAILING, MESH, filter_xml
 from support.scripts import LABELS, needs_meshlab, script_file
@@ -89,6 +91,17 @@ def test_a_filter_that_takes_all_memory_is_stopped_at_its_limit(tmp_path: Path) 
     with pytest.raises(ScriptError, match=r"Midpoint': needed more than 2 GB .* the mesh before it is in"):
         run_script(path, image=LABELS, output=tmp_path / "out.obj", memory=2.0)
     assert (tmp_path / "out.last_good.ply").stat().st_size > 0
+
+
+@needs_meshlab
+def test_a_filter_is_stopped_when_its_deadline_is_over(tmp_path: Path) -> None:
+    mesh = mesh_image(LABELS)
+    with MeshLabProcess(tmp_path, deadline=1.5) as process:
+        process.add(quad_layer(mesh))
+        start = time.monotonic()
+        with pytest.raises(MeshLabError, match=r"did not end within 1\.5 s"):
+            process.apply("meshing_surface_subdivision_doo_sabin")  # it never ends on quads
+        assert 1.5 <= time.monotonic() - start < 6.0
 
 
 def test_wrong_deadline_is_refused(tmp_path: Path) -> None:
