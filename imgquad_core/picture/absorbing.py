@@ -24,11 +24,12 @@ import scipy
 
 from imgquad_core.arrays import Flags, Floats, Labels
 from imgquad_core.geometry.corner_rule import corner_rule
+from imgquad_core.jit import kernel
 from imgquad_core.model import VOID, LabelImage
 from imgquad_core.orientation import turn_of_image
 
-from .clusters import labelled_clusters, roots_of
-from .cores import distances, flood, near_core
+from .clusters import pixels_of, roots_of
+from .cores import PX, distances, flood, near_core
 from .options import AbsorbOptions
 from .rounding import BELL_ENDS, rounded
 
@@ -129,17 +130,31 @@ def areas_of_origin(before: Labels, after: Labels, rule: int) -> Floats:
         In pixels; regions are numbered in the order of their first pixels. Those of the old picture give their area
         to their rests, by overlap; where nothing is left of one, its pixels count for the regions that they are in.
     """
-    old = roots_of(labelled_clusters(before, rule))
-    new = roots_of(labelled_clusters(after, rule))
-    solid = after.ravel() != VOID
-    is_first = solid & (new == np.arange(new.size))
-    region = (np.cumsum(is_first) - 1)[new[solid]]
-    same = solid & (before == after).ravel()
-    total = np.bincount(old[solid], minlength=len(old))
-    rest = np.bincount(old[same], minlength=len(old))
-    share = np.where(same, (total / np.maximum(rest, 1))[old], np.where(rest[old] == 0, 1.0, 0.0))
-    areas, pixels = np.bincount(region, share[solid]), np.bincount(region)
-    return np.asarray(np.maximum(areas, 0.5 * pixels))
+    return _areas_of_rests(before.ravel(), after.ravel(), roots_of(before, rule), roots_of(after, rule))
+
+
+@kernel
+def _areas_of_rests(before: Labels, after: Labels, old: Labels, new: Labels) -> Floats:
+    n = len(after)
+    total, rest, region = np.zeros(n, np.int32), np.zeros(n, np.int32), np.empty(n, np.int32)
+    n_regions = 0
+    for p in range(n):
+        if after[p] != VOID:
+            total[old[p]] += 1
+            rest[old[p]] += before[p] == after[p]
+            if new[p] == p:
+                region[p] = n_regions
+                n_regions += 1
+    areas, pixels = np.zeros(n_regions), np.zeros(n_regions)
+    for p in range(n):
+        if after[p] != VOID:
+            k = region[new[p]]
+            pixels[k] += 1.0
+            if before[p] == after[p]:
+                areas[k] += total[old[p]] / rest[old[p]]
+            elif rest[old[p]] == 0:
+                areas[k] += 1.0
+    return np.maximum(areas, 0.5 * pixels)
 
 
 def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[Labels, bool]:
@@ -150,7 +165,7 @@ def _absorbed(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[L
     new, stays, gone = _flooded(labels, stays, radius, rule)
     if not gone.any():
         return labels, False
-    is_noisy = bool(np.mean(gone > FAR * 2.0 * radius) > SPECKS)
+    is_noisy = bool(np.mean(gone > FAR * 2.0 * radius * PX) > SPECKS)
     if is_noisy:
         labels = _balanced(labels, stays, radius)
         new, stays, _ = _flooded(labels, stays, radius, rule)
@@ -173,13 +188,13 @@ def _settled(labels: Labels, stays: Flags, radius: float, rule: int) -> Labels:
     return _flooded(labels, stays, radius, rule)[0]
 
 
-def _flooded(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[Labels, Flags, Floats]:
+def _flooded(labels: Labels, stays: Flags, radius: float, rule: int) -> tuple[Labels, Flags, Labels]:
     """Flood what is thin; also tell what stays from now on, and how far each pixel is from what is kept."""
     kept = _kept(labels, stays, radius, rule)
     if kept.all() or not (kept & (labels != VOID)).any():
-        return labels, stays, np.zeros(labels.shape)
+        return labels, stays, np.zeros(labels.shape, np.int32)
     new, gone = flood(labels, kept)
-    return new, stays | (~kept & (gone == 0.0)), gone  # between void pixels, with nothing in reach that is kept
+    return new, stays | (~kept & (gone == 0)), gone  # between void pixels, with nothing in reach that is kept
 
 
 def _windows(flags: Flags, margin: int) -> Iterator[tuple[slice, slice]]:
@@ -209,10 +224,13 @@ def _rim(window: tuple[slice, slice], shape: tuple[int, ...], width: int) -> Fla
 
 def _kept(labels: Labels, stays: Flags, radius: float, rule: int) -> Flags:
     """Tell which pixels stay: near a core of a region that is large enough."""
-    clusters = labelled_clusters(labels, rule)
-    small = (clusters.pixels[roots_of(clusters)] < 4.0 * radius * radius).reshape(labels.shape)
-    kept = near_core(labels, distances(labels), radius, CORNER * radius)
-    return np.asarray((kept & ~small) | stays)
+    large = _are_large(roots_of(labels, rule), 4.0 * radius * radius).reshape(labels.shape)
+    return np.asarray((near_core(labels, distances(labels), radius, CORNER * radius) & large) | stays)
+
+
+def _are_large(root: Labels, least: float) -> Flags:
+    """Tell which pixels are in a region of at least so many pixels."""
+    return np.asarray((pixels_of(root) >= least)[root])
 
 
 def _balanced(labels: Labels, stays: Flags, width: float) -> Labels:
@@ -241,7 +259,7 @@ def _balanced(labels: Labels, stays: Flags, width: float) -> Labels:
 
 def _accounts(before: Labels, after: Labels, times: int, options: AbsorbOptions) -> tuple[Absorption, ...]:
     """Tell for each material what it lost and gained."""
-    root = roots_of(labelled_clusters(before, corner_rule(options.policy, options.step * times)))
+    root = roots_of(before, corner_rule(options.policy, options.step * times))
     stays = (before == after).ravel() & (before != VOID).ravel()
     is_left = np.zeros(before.size, bool)
     is_left[root[stays]] = True

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Ints, Labels
+from imgquad_core.arrays import Labels
 from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, joined_pair
 from imgquad_core.grouping import unite
 from imgquad_core.jit import kernel
@@ -26,21 +26,54 @@ def labelled_clusters(colors: Labels, rule: int) -> Clusters:
 
     `rule` says what is connected over a corner, see `imgquad_core.geometry.corner_rule`.
     """
-    n = colors.size
-    pixels = np.arange(n, dtype=np.int32)
-    clusters = Clusters(pixels, np.ones(n, np.int32), np.full(n, -1, np.int32), pixels.copy())
-    label_clusters(colors, clusters, rule)
-    return clusters
+    root = roots_of(colors, rule)
+    return Clusters(root, *_listed(root))
 
 
 @kernel
-def roots_of(clusters: Clusters) -> Ints:
-    """Return the root of each pixel, in reading order: parents come before their pixels."""
-    root = np.empty(len(clusters.parent), np.int64)
-    for p in range(len(root)):
-        parent = clusters.parent[p]
-        root[p] = p if parent == p else root[parent]
-    return root
+def roots_of(colors: Labels, rule: int) -> Labels:
+    """Return for each pixel, in reading order, the first pixel of its cluster."""
+    rows, cols = colors.shape
+    parent = np.arange(rows * cols, dtype=np.int32)
+    for r in range(rows):
+        for c in range(cols):
+            p = r * cols + c
+            if c > 0 and colors[r, c] == colors[r, c - 1]:
+                unite(parent, p - 1, p)
+            if r > 0 and colors[r, c] == colors[r - 1, c]:
+                unite(parent, p - cols, p)
+            if r > 0 and c > 0:
+                pair = joined_pair(colors, r, c, rule)
+                if pair == PAIR_AD:
+                    unite(parent, p - cols - 1, p)
+                elif pair == PAIR_BC:
+                    unite(parent, p - cols, p - 1)
+    for p in range(len(parent)):
+        parent[p] = parent[parent[p]]  # parents come before their pixels
+    return parent
+
+
+@kernel
+def pixels_of(root: Labels) -> Labels:
+    """Return the number of pixels of each cluster, at its root."""
+    pixels = np.zeros(len(root), np.int32)
+    for k in root:
+        pixels[k] += 1
+    return pixels
+
+
+@kernel
+def _listed(root: Labels) -> tuple[Labels, Labels, Labels]:
+    """Return `pixels`, `follower` and `last` of `Clusters`."""
+    n = len(root)
+    pixels, follower, last = np.ones(n, np.int32), np.full(n, -1, np.int32), np.arange(n, dtype=np.int32)
+    for p in range(n):
+        k = root[p]
+        if k != p:
+            pixels[k] += 1
+            follower[last[k]] = p
+            last[k] = p
+    return pixels, follower, last
 
 
 @kernel
@@ -54,22 +87,3 @@ def join(clusters: Clusters, p: int, q: int) -> int:
     clusters.follower[clusters.last[low]] = high
     clusters.last[low] = clusters.last[high]
     return high
-
-
-@kernel
-def label_clusters(colors: Labels, clusters: Clusters, rule: int) -> None:
-    """Unite the pixels of each cluster."""
-    rows, cols = colors.shape
-    for r in range(rows):
-        for c in range(cols):
-            p = r * cols + c
-            if c > 0 and colors[r, c] == colors[r, c - 1]:
-                join(clusters, p - 1, p)
-            if r > 0 and colors[r, c] == colors[r - 1, c]:
-                join(clusters, p - cols, p)
-            if r > 0 and c > 0:
-                pair = joined_pair(colors, r, c, rule)
-                if pair == PAIR_AD:
-                    join(clusters, p - cols - 1, p)
-                elif pair == PAIR_BC:
-                    join(clusters, p - cols, p - 1)

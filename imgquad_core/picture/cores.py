@@ -4,30 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from imgquad_core.arrays import Flags, Floats, Ints, Labels
+from imgquad_core.arrays import Flags, Floats, Ints, Labels, Singles
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID
 
-DIAGONAL = np.sqrt(2.0)
+PX, DIAGONAL = 10_000, 14_142  #: lengths of steps: whole numbers, so that ways of one length are equal
+_NOT_YET = 2**31 - 1
 
 
 @kernel
-def distances(labels: Labels) -> Floats:
+def distances(labels: Labels) -> Singles:
     """Distance of each pixel to the nearest one of another label, or outside the picture.
 
     Exact: in each row, within a run of one label, the squared distance is the lower envelope of parabolas, whose
     heights are distances within columns; beyond its ends there is another label at height 0.
     """
     rows, cols = labels.shape
-    up = np.empty((rows, cols))
+    up = np.empty((rows, cols), np.float32)  # half the memory: whole numbers, and roots of some
     for j in range(cols):
-        gone = 0.0
+        gone = 0
         for i in range(rows):
-            gone = 1.0 if i == 0 or labels[i, j] != labels[i - 1, j] else gone + 1.0
+            gone = 1 if i == 0 or labels[i, j] != labels[i - 1, j] else gone + 1
             up[i, j] = gone
         for i in range(rows - 1, -1, -1):
-            gone = 1.0 if i == rows - 1 or labels[i, j] != labels[i + 1, j] else gone + 1.0
-            up[i, j] = min(up[i, j], gone)
+            gone = 1 if i == rows - 1 or labels[i, j] != labels[i + 1, j] else gone + 1
+            up[i, j] = min(up[i, j], np.float32(gone))
     height, found = np.empty(cols + 2), np.empty(cols + 2)
     top, ends = np.empty(cols + 2, np.int64), np.empty(cols + 3)
     for i in range(rows):
@@ -39,7 +40,7 @@ def distances(labels: Labels) -> Floats:
             n = end - begin + 2
             height[0] = height[n - 1] = 0.0
             for k in range(1, n - 1):
-                height[k] = up[i, begin + k - 1] ** 2
+                height[k] = float(up[i, begin + k - 1]) ** 2
             _lower_envelope(height, n, top, ends, found)
             for k in range(1, n - 1):
                 up[i, begin + k - 1] = np.sqrt(found[k])
@@ -69,31 +70,30 @@ def _lower_envelope(height: Floats, n: int, top: Ints, ends: Floats, found: Floa
 
 
 @kernel
-def near_core(labels: Labels, distance: Floats, radius: float, reach: float) -> Flags:
+def near_core(labels: Labels, distance: Singles, radius: float, reach: float) -> Flags:
     """Tell which pixels are within reach of one farther than `radius` from other labels, on a way in their region."""
     rows, cols = labels.shape
-    gone = np.empty((rows, cols))
-    queue = np.empty(rows * cols, np.int64)
+    gone = np.empty((rows, cols), np.int32)
+    queue = np.empty(rows * cols, np.int32)
     waits = np.zeros((rows, cols), np.bool_)
     count = 0
     for i in range(rows):
         for j in range(cols):
-            gone[i, j] = 0.0 if distance[i, j] > radius else np.inf
+            gone[i, j] = 0 if distance[i, j] > radius else _NOT_YET
             if distance[i, j] > radius and distance[i, j] <= radius + 2.0:
                 queue[count] = i * cols + j
                 waits[i, j] = True
                 count += 1
-    _spread(labels, gone, queue, waits, count, reach, True, labels)
-    kept = np.empty((rows, cols), np.bool_)
+    _spread(labels, gone, queue, waits, count, int(reach * PX), True, labels)
     for i in range(rows):
         for j in range(cols):
-            kept[i, j] = gone[i, j] <= reach
-    return kept
+            waits[i, j] = gone[i, j] != _NOT_YET
+    return waits
 
 
 @verb
 def _spread(
-    labels: Labels, gone: Floats, queue: Ints, waits: Flags, count: int, reach: float, inside: bool, out: Labels
+    labels: Labels, gone: Labels, queue: Labels, waits: Flags, count: int, reach: int, inside: bool, out: Labels
 ) -> None:
     """Carry lengths of ways on from the pixels in the queue, first come first served, until none gets shorter.
 
@@ -112,8 +112,8 @@ def _spread(
                 a, b = i + di, j + dj
                 if (di == 0 and dj == 0) or a < 0 or b < 0 or a >= rows or b >= cols:
                     continue
-                way = gone[i, j] + (DIAGONAL if di != 0 and dj != 0 else 1.0)
-                if way >= gone[a, b] - 1e-9 or way > reach or (inside and labels[a, b] != labels[i, j]):
+                way = gone[i, j] + (DIAGONAL if di != 0 and dj != 0 else PX)
+                if way >= gone[a, b] or way > reach or (inside and labels[a, b] != labels[i, j]):
                     continue
                 gone[a, b] = way
                 if not inside:
@@ -125,26 +125,26 @@ def _spread(
 
 
 @kernel
-def flood(labels: Labels, kept: Flags) -> tuple[Labels, Floats]:
-    """Give pixels that are not kept to the nearest that are, over those that are not; also return how far that is."""
+def flood(labels: Labels, kept: Flags) -> tuple[Labels, Labels]:
+    """Give pixels that are not kept to the nearest that are, over those that are not; also tell how far, in 1 / PX."""
     rows, cols = labels.shape
     out = labels.copy()
-    gone = np.empty((rows, cols))
-    queue = np.empty(rows * cols, np.int64)
+    gone = np.empty((rows, cols), np.int32)
+    queue = np.empty(rows * cols, np.int32)
     waits = np.zeros((rows, cols), np.bool_)
     count = 0
     for i in range(rows):
         for j in range(cols):
-            gone[i, j] = 0.0 if kept[i, j] else np.inf
+            gone[i, j] = 0 if kept[i, j] else _NOT_YET
             if kept[i, j] and labels[i, j] != VOID and _is_beside(kept, i, j):
                 queue[count] = i * cols + j
                 waits[i, j] = True
                 count += 1
-    _spread(labels, gone, queue, waits, count, np.inf, False, out)
+    _spread(labels, gone, queue, waits, count, _NOT_YET, False, out)
     for i in range(rows):
         for j in range(cols):
-            if gone[i, j] == np.inf:
-                gone[i, j] = 0.0  # out of reach: between void pixels
+            if gone[i, j] == _NOT_YET:
+                gone[i, j] = 0  # out of reach: between void pixels
     return out, gone
 
 
