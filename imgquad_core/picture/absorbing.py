@@ -260,21 +260,16 @@ def _balanced(labels: Labels, stays: Flags, width: float) -> Labels:
 def _accounts(before: Labels, after: Labels, times: int, options: AbsorbOptions) -> tuple[Absorption, ...]:
     """Tell for each material what it lost and gained."""
     root = roots_of(before, corner_rule(options.policy, options.step * times))
-    stays = (before == after).ravel() & (before != VOID).ravel()
-    is_left = np.zeros(before.size, bool)
-    is_left[root[stays]] = True
-    first = np.flatnonzero((root == np.arange(root.size)) & (before != VOID).ravel())
-    label = before.ravel()[first]
-    rows = []
-    for m in np.unique(label).tolist():
-        mine = label == m
-        was, now = before == m, after == m
-        rows.append(
-            Absorption(
-                m,
-                int(np.count_nonzero(mine)),
-                int(np.count_nonzero(mine & ~is_left[first])),
-                *(int(np.count_nonzero(x)) // times**2 for x in (was, was & ~now, now & ~was)),
-            )
-        )
-    return tuple(rows)
+    old, new, gone = before.ravel(), after.ravel(), np.flatnonzero(before != after)
+    first = np.flatnonzero((root == np.arange(root.size)) & (old != VOID))
+    materials, region = np.unique(old[first], return_inverse=True)
+    stays = pixels_of(root)[first]
+    whole, n = stays.copy(), len(materials)
+    np.subtract.at(stays, np.searchsorted(first, root[gone]), 1)
+    counts = (
+        np.bincount(region, minlength=n),
+        np.bincount(region[stays == 0], minlength=n),
+        np.bincount(region, whole, n) // times**2,
+        *(np.bincount(np.searchsorted(materials, labels[gone]), minlength=n) // times**2 for labels in (old, new)),
+    )
+    return tuple(Absorption(*map(int, row)) for row in zip(materials, *counts, strict=True))

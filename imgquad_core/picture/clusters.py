@@ -38,11 +38,12 @@ def roots_of(colors: Labels, rule: int) -> Labels:
     for r in range(rows):
         for c in range(cols):
             p = r * cols + c
-            if c > 0 and colors[r, c] == colors[r, c - 1]:
-                unite(parent, p - 1, p)
-            if r > 0 and colors[r, c] == colors[r - 1, c]:
+            beside, below = c > 0 and colors[r, c] == colors[r, c - 1], r > 0 and colors[r, c] == colors[r - 1, c]
+            if beside:
+                parent[p] = parent[p - 1]
+            if below and not (beside and colors[r, c] == colors[r - 1, c - 1]):  # else they are united already
                 unite(parent, p - cols, p)
-            if r > 0 and c > 0:
+            if r > 0 and c > 0 and not beside and not below:
                 pair = joined_pair(colors, r, c, rule)
                 if pair == PAIR_AD:
                     unite(parent, p - cols - 1, p)

@@ -21,14 +21,13 @@ def distances(labels: Labels) -> Singles:
     """
     rows, cols = labels.shape
     up = np.empty((rows, cols), np.float32)  # half the memory: whole numbers, and roots of some
-    for j in range(cols):
-        gone = 0
-        for i in range(rows):
-            gone = 1 if i == 0 or labels[i, j] != labels[i - 1, j] else gone + 1
-            up[i, j] = gone
-        for i in range(rows - 1, -1, -1):
-            gone = 1 if i == rows - 1 or labels[i, j] != labels[i + 1, j] else gone + 1
-            up[i, j] = min(up[i, j], np.float32(gone))
+    for i in range(rows):
+        for j in range(cols):
+            up[i, j] = 1.0 if i == 0 or labels[i, j] != labels[i - 1, j] else up[i - 1, j] + 1.0
+    for i in range(rows - 1, -1, -1):
+        for j in range(cols):
+            down = 1.0 if i == rows - 1 or labels[i, j] != labels[i + 1, j] else up[i + 1, j] + 1.0
+            up[i, j] = min(up[i, j], np.float32(down))
     height, found = np.empty(cols + 2), np.empty(cols + 2)
     top, ends = np.empty(cols + 2, np.int64), np.empty(cols + 3)
     for i in range(rows):
