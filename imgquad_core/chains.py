@@ -36,6 +36,11 @@ def edges_of_chains(graph: BoundaryGraph) -> Ints:
     return np.diff(graph.chain_offsets) - 1
 
 
+def any_of_chain(flags: Flags, offsets: Ints) -> Flags:
+    """Tell for each chain whether any of its entries is flagged."""
+    return np.logical_or.reduceat(flags, offsets[:-1])
+
+
 def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
     """Return the graph with a mid-point on every edge of the flagged chains, but for held ones."""
     return _split(graph, chains[chain_of_places(graph)])

@@ -282,8 +282,3 @@ def mark_conflicts(
 def mark_sectors(points: Floats, strided: Strided, ends: Ends, marks: Bytes) -> None:
     """Mark the segments on both sides of sectors that are too sharp, in place."""
     mark_sharp(points, strided.chain_points, strided.offsets, ends.offsets, ends.sockets, _LEAST_SECTOR, marks)
-
-
-def any_of_chain(flags: Flags, offsets: Ints) -> Flags:
-    """Tell for each chain whether any of its entries is flagged."""
-    return np.logical_or.reduceat(flags, offsets[:-1])

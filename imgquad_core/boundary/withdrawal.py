@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
-from imgquad_core.chains import places_of
+from imgquad_core.chains import any_of_chain, places_of
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.conflicts import CROSSING, FREE, SHARP, UNITS, find_conflicts, snapped
 from imgquad_core.model import Chains
@@ -23,7 +23,6 @@ from .edge_sizes import grade_along, grade_chains
 from .nodes import (
     Nodes,
     Strided,
-    any_of_chain,
     even_out,
     mark_conflicts,
     mark_sectors,

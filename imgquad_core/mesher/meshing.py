@@ -15,20 +15,21 @@ import numpy as np
 
 from imgquad_core import ahead
 from imgquad_core.arrays import Flags, Floats, Ints, Labels
-from imgquad_core.chains import edges_of_chains, without_unused_points
+from imgquad_core.chains import any_of_chain, edges_of_chains, without_unused_points
 from imgquad_core.cleanup.faces import FaceQuads, joined, stitched
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.cleanup.relaxation import GOOD, GUARD, newton, part, rings_of, untangle
 from imgquad_core.cleanup.sliding import slide
 from imgquad_core.cleanup.strips import independent_nodes, strips_of
 from imgquad_core.errors import TopologyError
+from imgquad_core.geometry.conflicts import CROSSING, find_conflicts
 from imgquad_core.geometry.quad_shape import lower_to_worst
-from imgquad_core.model import BoundaryGraph, Materials, PointKind, QuadMesh
+from imgquad_core.model import VOID, BoundaryGraph, Materials, PointKind, QuadMesh
 from imgquad_core.threads import in_threads
 
 from .efforts import EFFORTS
 from .options import MeshingOptions
-from .outline import with_short_chains_halved
+from .outline import coarse_segments, with_short_chains_halved
 from .progress import Progress
 from .refits import State, with_musts, with_wishes
 from .strides import LEAST_WIDTH, consistent, mesh_faces
@@ -78,7 +79,7 @@ def mesh_boundaries(
     state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options, progress))
     state = with_musts(with_wishes(state, options), options)
     mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
-    return _slid(mesh, EFFORTS[options.effort].slides, options.n_threads, options.tuning.portions)
+    return _slid(mesh, graph.shape, EFFORTS[options.effort].slides, options.n_threads, options.tuning.portions)
 
 
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
@@ -87,22 +88,50 @@ def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) 
     return stitched(joined(parts), place, graph.points, graph.point_kind, graph.chains, graph.region_label, materials)
 
 
-def _slid(mesh: QuadMesh, rounds: int, threads: int, portions: Portions) -> QuadMesh:
-    """Let boundary nodes slide, and the nodes inside follow."""
+def _slid(mesh: QuadMesh, shape: tuple[int, int], rounds: int, threads: int, portions: Portions) -> QuadMesh:
+    """Let boundary nodes slide, and the nodes inside follow.
+
+    Quads on both sides keep chains apart; on the side of void there are none, so what meets there is held, and all is
+    done anew.
+    """
+    held = np.zeros(mesh.n_points, bool)
+    while True:
+        moved = _slid_but(mesh, held, rounds, threads, portions)
+        met = _met_over_void(moved, shape) & ~held & (moved.points != mesh.points).any(axis=1)
+        if not met.any():
+            return moved
+        held |= met
+
+
+def _slid_but(mesh: QuadMesh, held: Flags, rounds: int, threads: int, portions: Portions) -> QuadMesh:
     points, gone = mesh.points.copy(), np.zeros(mesh.n_points)
     rings, (groups, seams) = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads, portions)
+    kind = np.where(held, np.uint8(PointKind.HELD), mesh.point_kind)
 
     def move(how: Callable[[Flags], object]) -> None:
         in_threads(groups, how, threads)
         how(seams)
 
     for _ in range(rounds):
-        slide(points, rings, mesh.point_kind, mesh.chain_offsets, mesh.chain_points, gone)
+        slide(points, rings, kind, mesh.chain_offsets, mesh.chain_points, gone)
         move(lambda free: newton(points, rings, free, 2, GOOD))
     move(lambda free: untangle(points, rings, free, 4, FAIR))
     floor = _worst(points, rings.quads)
     move(lambda free: part(points, rings, free, STUB, floor))
     return replace(mesh, points=points)
+
+
+def _met_over_void(mesh: QuadMesh, shape: tuple[int, int]) -> Flags:
+    """Flag the points of boundaries of void that cross or touch others, or have left the picture."""
+    met: Flags = ((mesh.points < 0.0) | (mesh.points > shape[::-1])).any(axis=1)
+    is_free = any_of_chain(mesh.point_kind[mesh.chain_points] == PointKind.FREE, mesh.chain_offsets)
+    of_void = is_free & (mesh.chain_regions == VOID).any(axis=1)  # the picture's border has no free points
+    if of_void.any():
+        segments = coarse_segments(mesh, np.ones(len(of_void), bool), 1)
+        pairs = np.stack([segments.tail, segments.head], axis=1)
+        marks = find_conflicts(mesh.points, pairs, segments.chain, of_void, shape)
+        met[pairs[marks == CROSSING]] = True
+    return met
 
 
 def _worst(points: Floats, quads: Ints) -> float:

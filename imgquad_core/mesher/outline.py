@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.chains import chain_of_places, edges_of_chains, halved
 from imgquad_core.geometry.conflicts import CROSSING, find_conflicts
-from imgquad_core.model import VOID, BoundaryGraph, PointKind
+from imgquad_core.model import VOID, BoundaryGraph, PointKind, QuadMesh
 
 from .triangulation import Constraints, constraint_table
 
@@ -44,7 +44,7 @@ class Outline(NamedTuple):
     constraints: Constraints
 
 
-def coarse_segments(graph: BoundaryGraph, chains: Flags, stride: int) -> Segments:
+def coarse_segments(graph: BoundaryGraph | QuadMesh, chains: Flags, stride: int) -> Segments:
     """Return the segments over `stride` edges each of the flagged chains, whose edges must be a multiple of it."""
     chosen = np.flatnonzero(chains)
     counts = (np.diff(graph.chain_offsets)[chosen] - 1) // stride
