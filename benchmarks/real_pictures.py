@@ -47,7 +47,9 @@ CLEAN = (
 LEAST_SJ, LEAST_SJ_CLEAN, GOOD_ANGLES_CLEAN = 0.3, 0.4, 0.99
 #: of the judged runs; the size is multiplied by the latter. Least number first: the quickest meshes
 JUDGED_SIZES, TOLERANCES = (32.0, 16.0, 5.0, 2.0), (1.0, 0.5, 0.0)
-LEAST_SJ_TOLERANT, MOST_LOST = 0.45, 0.025
+LEAST_SJ_TOLERANT = 0.45
+#: of a material's area may be off where it gives away less than the latter share
+MOST_OFF, MOST_GIVEN = 0.025, 0.1
 #: pictures that are cropped for the judged runs: all of it at size 2 would be six million quads
 CROPPED = {"oof2_grains_large_5000": "0,0,2000,2000"}
 
@@ -162,12 +164,26 @@ def judged(picture: Path, run: Judged, folder: Path) -> dict[str, Any]:
         "field": field_integral(points[:, :2], quads, rim, run.size),
         "cpu": seconds,
         "regions": told["counts"]["regions"],
+        "area_off": max(
+            (off for row in told["materials"] if (off := _area_off(row, absorbed)) is not None), default=0.0
+        ),
         "lost": [names[m] for m in lost],
         "lost_in_silence": [names[m] for m in lost if m not in absorbed or names[m] not in said],
         "moved": sum(row["lost"] for row in absorbed.values())
         / max(1, sum(row["pixels"] for row in absorbed.values())),
         "stages": told["seconds"],
     }
+
+
+def _area_off(row: dict[str, Any], absorbed: dict[int, dict[str, Any]]) -> float | None:
+    """Return by which share a material's area is off, where it keeps most of its pixels.
+
+    Regions keep the area that they had, and what is absorbed goes to others: either counts as right.
+    """
+    lost = absorbed[row["material"]]["lost"] if absorbed else 0
+    if lost >= MOST_GIVEN * row["pixels"]:
+        return None
+    return min(abs(row["mesh_area"] / pixels - 1.0) for pixels in (row["pixels"], row["clean_pixels"]))
 
 
 def judged_section(found: dict[Judged, dict[str, Any]]) -> str:
@@ -202,6 +218,9 @@ def judged_limits(found: dict[Judged, dict[str, Any]]) -> str:
             "all", sum(len(row["lost_in_silence"]) for row in good.values()), "{:.0f}"
         ),
     ]
+    for run in sorted((run for run in good if "area_off" in good[run]), key=lambda run: -good[run]["area_off"])[:5]:
+        where = f"{run.picture} {run.size:g}, tolerance {run.tolerance:g}"
+        rows.append(Limit("area of a material off", MOST_OFF, True).row(where, good[run]["area_off"], "{:.2%}"))
     for what, figures in (("tolerance", tolerant), ("as it is", exact)):
         for run in sorted(figures, key=lambda run: figures[run])[:5]:
             where = f"{run.picture} {run.size:g}, {what} {run.tolerance:g}"
