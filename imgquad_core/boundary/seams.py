@@ -6,12 +6,12 @@ have without it, but for one where it ends: no edge gets shorter because a seam 
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
-from scipy.spatial import cKDTree
+import scipy
 
 from imgquad_core.arrays import Flags, Floats, Ints
 
@@ -65,7 +65,7 @@ def _bend(points: Floats, curves: Curves, is_seam: Flags, room: float) -> None:
     """Move seams off boundaries, but near their ends, where they belong to one."""
     at_seam = per_point(curves, is_seam)
     at, boundary = np.flatnonzero(at_seam), points[~at_seam]
-    tree = cKDTree(boundary)
+    tree = scipy.spatial.cKDTree(boundary)
     to_end = np.minimum(curves.arc, per_point(curves, curves.arc[curves.offsets[1:] - 1]) - curves.arc)[at] / room
     offsets = _offsets_of(np.diff(curves.offsets)[is_seam])
     for _ in range(ROUNDS):
@@ -81,8 +81,8 @@ def _bend(points: Floats, curves: Curves, is_seam: Flags, room: float) -> None:
 def _spread(push: Floats, offsets: Ints, reach: int) -> Floats:
     """Average over so many points on each side along each seam."""
     parts = (push[a:b] for a, b in pairwise(offsets))
-    spread = [uniform_filter1d(part, min(2 * reach + 1, len(part)), axis=0, mode="constant") for part in parts]
-    return np.concatenate(spread)
+    average = partial(scipy.ndimage.uniform_filter1d, axis=0, mode="constant")
+    return np.concatenate([average(part, min(2 * reach + 1, len(part))) for part in parts])
 
 
 def moved_areas(points: Floats, curves: Curves, is_seam: Flags, sides: Ints, n: int) -> Floats:
