@@ -30,8 +30,9 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 #: versions of Numba whose inside `lowering` knows; with others kernels are the same, and take longer to compile
 KNOWN = ("0.68",)
 if numba.__version__.rpartition(".")[0] in KNOWN:
-    from .lowering import KernelCompiler, VerbCompiler, ready_to_load
+    from .lowering import KernelCompiler, KernelFiles, VerbCompiler, ready_to_load
 else:
+    from numba.core.caching import CompileResultCacheImpl as KernelFiles  # type: ignore[no-redef,unused-ignore]
     from numba.core.compiler import Compiler as KernelCompiler  # type: ignore[no-redef,unused-ignore]
     from numba.core.compiler import Compiler as VerbCompiler  # type: ignore[no-redef,unused-ignore]
 
@@ -144,6 +145,8 @@ def _tell_that_none_is_kept(reason: str) -> None:
 
 class _KernelCache(FunctionCache):  # type: ignore[misc]
     """Machine code on disk, whose absence or damage never stops a run."""
+
+    _impl_class = KernelFiles
 
     def __init__(self, function: Any) -> None:
         super().__init__(function)

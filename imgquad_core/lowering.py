@@ -3,7 +3,7 @@
 - A verb is called by kernels only, which hold a copy of it. It gets no machine code of its own, and is not optimised
   before it is part of a kernel.
 - References to arrays are counted only where arrays are made: elsewhere the caller holds all of them.
-- Machine code from disk is loaded without what compiling would need.
+- Machine code from disk is loaded without what compiling would need (0.34 -> 0.11 s for the 56 kernels of a run).
 - Which of its 50 kinds of sums an ``a + b`` is, is looked up once for each pair of types.
 """
 
@@ -11,12 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
+from llvmlite import binding
+from numba.core.caching import CompileResultCacheImpl
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
-from numba.core.runtime import rtsys
+from numba.core.runtime import _nrt_python
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering
 from numba.core.types.functions import BaseFunction
@@ -27,8 +30,73 @@ _resolve = BaseFunction.get_call_type
 
 
 def ready_to_load(context: Any) -> None:
-    """Make `context` ready for machine code that is loaded: all that Numba can compile, 0.1 s, is not needed for it."""
-    rtsys.initialize(context)
+    """Get ready for machine code that is loaded: all that Numba can compile, 0.1 s, is not needed for it."""
+    _name_runtime()
+
+
+@cache
+def _name_runtime() -> None:
+    """Tell the linker where the functions are that machine code calls."""
+    for name, address in _nrt_python.c_helpers.items():
+        binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
+class KernelFiles(CompileResultCacheImpl):  # type: ignore[misc]
+    """What is kept of a kernel, and how it is loaded: to be called; what its callers need if any are compiled, then."""
+
+    def reduce(self, result: Any) -> Any:
+        """Return what is kept; environments are for objects of Python, which most verbs have none of."""
+        *others, environments = super().reduce(result)
+        return (*others, tuple(e for e in environments if e.consts))
+
+    def rebuild(self, target_context: Any, kept: Any) -> Any:
+        """Return the kernel."""
+        (name, _, codes), described, environment, signature, _, lifted, text, begun, environments = kept
+        for begin in begun:
+            begin()
+        library = _Loaded(target_context.codegen(), name, *codes)
+        entry = target_context.get_executable(library, described, environment)
+        for each in environments:
+            library.codegen.set_env(each.env_name, each)
+        return CompileResult(
+            target_context=target_context,
+            typing_context=target_context.typing_context,
+            library=library,
+            environment=environment,
+            entry_point=entry,
+            fndesc=described,
+            type_annotation=text,
+            signature=signature,
+            objectmode=False,
+            lifted=lifted,
+            typing_error=None,
+            call_helper=None,
+            metadata=None,
+            reload_init=begun,
+            referenced_envs=environments,
+        )
+
+
+class _Loaded(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code from disk, and its source as LLVM has it, which is parsed when a caller is compiled."""
+
+    def __init__(self, codegen: Any, name: str, code: bytes, source: bytes) -> None:
+        super().__init__(codegen, name)
+        self._source = source
+        self._linkable: Any = None
+        self.enable_object_caching()
+        self._set_compiled_object(code)
+        self._finalize_final_module()
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return the address of one of its functions."""
+        return int(self._codegen._engine.get_function_address(name))
+
+    def _get_module_for_linking(self) -> Any:
+        if self._linkable is None:
+            self._linkable = binding.parse_bitcode(self._source)
+            self._codegen._engine._load_defined_symbols(self._linkable)
+        return self._linkable
 
 
 class _Part(JITCodeLibrary):  # type: ignore[misc]

@@ -189,3 +189,44 @@ print(nodes_of_poor(points, quads, 0.5).tolist(), "imgquad_core.lowering" in sys
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
     assert done.stdout == "[False, False, False, False] False\n", done.stderr
+
+
+KERNELS = """
+from typing import NamedTuple
+import numpy as np
+from imgquad_core.jit import kernel, verb
+
+class Pair(NamedTuple):
+    counts: np.ndarray
+    total: float
+
+@verb
+def _half(x):
+    return 0.5 * x
+
+@kernel
+def inner(n):
+    counts = np.arange(n)
+    return Pair(counts, _half(counts.sum()))
+
+@kernel
+def outer(n):
+    return inner(n).total + inner(n + 1).counts[-1]
+"""
+CALLS = {
+    "compiled": "print(inner(4))",
+    "loaded": "print(inner(4), outer(4))",
+    "all loaded": "print(outer(4), inner(4))",
+}
+
+
+def test_a_kernel_from_disk_is_called_and_becomes_part_of_others(tmp_path: Path) -> None:
+    (tmp_path / "some_kernels.py").write_text(KERNELS, encoding="utf-8")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(tmp_path)}
+    hits = "print(sum(inner.stats.cache_hits.values()), sum(outer.stats.cache_hits.values()))"
+    told = []
+    for calls in CALLS.values():
+        command = [sys.executable, "-c", f"from some_kernels import *\n{calls}\n{hits}"]
+        told.append(subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout)
+    pair = "Pair(counts=array([0, 1, 2, 3]), total=3.0)"
+    assert told == [f"{pair}\n0 0\n", f"{pair} 7.0\n1 0\n", f"7.0 {pair}\n1 1\n"]
