@@ -19,9 +19,10 @@ import pickle
 import stat
 import tempfile
 import zlib
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from itertools import count
 from pathlib import Path
+from threading import RLock
 from typing import Any, NoReturn, TypeVar
 
 import numba
@@ -30,7 +31,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 #: versions of Numba whose inside `lowering` knows; with others kernels are the same, and take longer to compile
 KNOWN = ("0.68",)
 if numba.__version__.rpartition(".")[0] in KNOWN:
-    from .lowering import KernelCompiler, KernelFiles, VerbCompiler, ready_to_load
+    from .lowering import KernelCompiler, KernelFiles, VerbCompiler, ready_to_load, skip_extensions
 else:
     from numba.core.caching import CompileResultCacheImpl as KernelFiles  # type: ignore[no-redef,unused-ignore]
     from numba.core.compiler import Compiler as KernelCompiler  # type: ignore[no-redef,unused-ignore]
@@ -40,10 +41,14 @@ else:
         """Make `context` ready for machine code that is loaded, as Numba does it."""
         context.refresh()
 
+    def skip_extensions(dispatcher: Any) -> None:
+        """Do without what other packages add to Numba, where that can be done."""
+
 
 F = TypeVar("F")
 _KERNELS: list[Any] = []
 _LOG = logging.getLogger("imgquad_core")
+_MAKING = RLock()
 _CURE = "set NUMBA_CACHE_DIR to a folder that can be written, once"
 
 
@@ -58,17 +63,61 @@ def verb(function: F) -> F:
 
 
 def _compiled(function: F, is_verb: bool = False) -> F:
-    flags = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "no_cpython_wrapper": is_verb}
-    compiled: Any = numba.njit(pipeline_class=VerbCompiler if is_verb else KernelCompiler, **flags)(function)
-    if not hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT: the function itself
-        return compiled  # type: ignore[no-any-return]
-    _ignore_literals(compiled)
-    if is_verb:
-        _keep_from_python(compiled)
-    else:
-        compiled._cache = _LateCache(compiled)
+    if numba.config.DISABLE_JIT:
+        return function
+    compiled: Any = _Late(function, is_verb)
+    if not is_verb:
         _KERNELS.append(compiled)
     return compiled  # type: ignore[no-any-return]
+
+
+class _Late:
+    """A function that becomes one of Numba's when it is called, or a caller is compiled: at most starts few do."""
+
+    def __init__(self, function: Any, is_verb: bool) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        self._is_verb = is_verb
+        self._made: Any = None
+
+    def __call__(self, *args: Any) -> Any:
+        return (self._made or self.dispatcher)(*args)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.dispatcher, name)
+
+    def __reduce__(self) -> Any:
+        name = self.py_func.__qualname__
+        return self.dispatcher.__reduce__() if "<locals>" in name else name  # as a function is: by its name
+
+    @property
+    def dispatcher(self) -> Any:
+        """What Numba makes of the function."""
+        with _MAKING:
+            self._made = self._made or self._given_to_numba()
+        return self._made
+
+    def _given_to_numba(self) -> Any:
+        flags = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "no_cpython_wrapper": self._is_verb}
+        compiler = VerbCompiler if self._is_verb else KernelCompiler
+        dispatcher: Any = numba.njit(pipeline_class=compiler, **flags)(self.py_func)
+        _ignore_literals(dispatcher)
+        if self._is_verb:
+            _keep_from_python(dispatcher)
+        else:
+            dispatcher._cache = self.cache
+        skip_extensions(dispatcher)
+        return dispatcher
+
+    @cached_property
+    def cache(self) -> Any:
+        """Where machine code is kept."""
+        return _cache_of(self.py_func)
+
+
+@numba.extending.typeof_impl.register(_Late)  # type: ignore[untyped-decorator,unused-ignore]
+def _type_of_late(late: _Late, _: Any) -> Any:
+    return numba.typeof(late.dispatcher)
 
 
 def _ignore_literals(compiled: Any) -> None:
@@ -88,20 +137,6 @@ def _keep_from_python(compiled: Any) -> None:
 
     compiled._compile_for_args = refuse
     compiled.add_overload = add_overload
-
-
-class _LateCache:
-    """Stands for the cache of a function until that is asked for: at most starts few are, of the 80 that there are.
-
-    Numba tries for each whether its folder can be written.
-    """
-
-    def __init__(self, compiled: Any) -> None:
-        self._compiled = compiled
-
-    def __getattr__(self, name: str) -> Any:
-        self._compiled._cache = cache = _cache_of(self._compiled.py_func)
-        return getattr(cache, name)
 
 
 def _cache_of(function: Any) -> Any:
@@ -225,7 +260,7 @@ def share_on_disk() -> float:
 def folders_on_disk() -> list[Path]:
     """Return where the machine code of the kernels imported so far is kept; nowhere if no folder can be written."""
     of_each_file = {k.py_func.__code__.co_filename: k for k in _KERNELS}
-    paths = {k._cache.cache_path for k in of_each_file.values()}
+    paths = {k.cache.cache_path for k in of_each_file.values()}
     return sorted(Path(path) for path in paths if path)
 
 

@@ -41,6 +41,11 @@ def _name_runtime() -> None:
         binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
+def skip_extensions(dispatcher: Any) -> None:
+    """Do without what other packages add to Numba, for which all packages are looked through."""
+    dispatcher._compilation_chain_init_hook = lambda: None
+
+
 class KernelFiles(CompileResultCacheImpl):  # type: ignore[misc]
     """What is kept of a kernel, and how it is loaded: to be called; what its callers need if any are compiled, then."""
 

@@ -7,9 +7,8 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from io import TextIOWrapper
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from imgquad_core.errors import ImgquadError, InputError, QualityError
 from imgquad_core.whole_files import remove_scratch
@@ -29,6 +28,16 @@ class Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
+class _Version(argparse.Action):
+    """Print the version, which is looked up when it is asked for: that takes longer than all else here."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from importlib.metadata import version
+
+        print(f"imgquad-mesh {version('imgquad-mesh')}")
+        parser.exit()
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of the command with all its subcommands."""
     parser = Parser(
@@ -36,7 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
         description="Turns any picture of a structure into an all-quadrilateral, multi-material finite element mesh.",
         epilog="exit codes: 0 good, 2 bad input, 3 an asked limit was not met (the mesh is written all the same)",
     )
-    parser.add_argument("--version", action="version", version=_version())
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     subparsers = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
     commands = (cli.run, cli.stack, cli.tiles, cli.demo, cli.studio, cli.script, cli.list_filters, cli.warm)
     for command in commands:
@@ -84,10 +93,6 @@ def _told(error: Exception) -> tuple[object, int]:
 def _failed(reason: object, code: int) -> int:
     print("imgquad-mesh: error:", " ".join(str(reason).split()), file=sys.stderr)
     return code
-
-
-def _version() -> str:
-    return f"imgquad-mesh {version('imgquad-mesh')}"
 
 
 if __name__ == "__main__":

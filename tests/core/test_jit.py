@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -230,3 +231,12 @@ def test_a_kernel_from_disk_is_called_and_becomes_part_of_others(tmp_path: Path)
         told.append(subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout)
     pair = "Pair(counts=array([0, 1, 2, 3]), total=3.0)"
     assert told == [f"{pair}\n0 0\n", f"{pair} 7.0\n1 0\n", f"7.0 {pair}\n1 1\n"]
+
+
+def test_a_kernel_is_given_to_numba_when_it_is_called() -> None:
+    code = "from imgquad_core import jit, pipeline; print(len(jit._KERNELS) > 50, any(k._made for k in jit._KERNELS))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "True False\n"
+
+
+def test_kernels_are_pickled_by_name() -> None:
+    assert pickle.loads(pickle.dumps(_use_both)) is _use_both

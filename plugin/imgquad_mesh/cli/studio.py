@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import socket
-import webbrowser
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +57,8 @@ def execute(args: argparse.Namespace) -> int:
             print(f"warning: whoever reaches {args.host} and has this address can use the studio, unencrypted")
         print(f"the studio is at {place.address} (Ctrl-C ends it)", flush=True)
         if not args.no_browser:
+            import webbrowser  # not above: the command loads this module whatever it does
+
             webbrowser.open(place.address)
         serve(place, limits, args.picture, listening)
     return 0

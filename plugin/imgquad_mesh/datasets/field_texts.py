@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from html import escape  # xml.sax.saxutils loads urllib, http and ssl
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +103,7 @@ def _texts(table: NDArray[np.uint8]) -> list[str] | None:
 
 def quoted(name: str) -> str:
     """Return a name as it stands in an attribute of XML."""
-    return escape(name, {'"': "&quot;"})
+    return escape(name, quote=False).replace('"', "&quot;")
 
 
 def _label(text: str) -> str:

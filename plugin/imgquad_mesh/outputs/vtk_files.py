@@ -6,7 +6,6 @@ from pathlib import Path
 from time import time
 from typing import Any
 
-from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 from imgquad_core.whole_files import take_room
@@ -47,6 +46,8 @@ def save_dataset(dataset: Any, path: Path) -> None:
 
 def save_legacy(grid: Any, path: Path, title: str) -> None:
     """Save a grid as text that other readers of ``.vtk`` than VTK's know (version 4.2)."""
+    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter  # not above: few files are of this kind
+
     writer = vtkUnstructuredGridWriter()
     writer.SetFileVersion(42)  # 5.1 is read by VTK only
     writer.SetHeader(title[:LEGACY_TITLE])
