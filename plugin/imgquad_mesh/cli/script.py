@@ -56,6 +56,7 @@ def execute(args: argparse.Namespace) -> int:
     if args.report:
         outputs.check_target(args.report, (".json",))
         outputs.check_files([args.script, args.input], [args.output, args.report])
+    meshlab.pymeshlab_filters.ask_early(args.script)
     is_mesh = args.input is not None and args.input.suffix.lower() in MESHES
     run = partial(
         meshlab.script.run_script,

@@ -101,6 +101,7 @@ class MeshLabProcess:
         self._count = 0
         self._started = False
         self._saved: Path | None = None
+        self._read: tuple[Path, Layer] | None = None  # the layer that was asked for last, and its file
         self._files: dict[int, Path] = {}  # of layers, by id, that are still what their file has
 
     def __enter__(self) -> MeshLabProcess:
@@ -230,7 +231,10 @@ class MeshLabProcess:
         """Return the current layer, or the one with this id."""
         found = self.layers[1] if mesh is None else mesh
         assert found is not None, "no layer is left"
-        return load_layer(self._file_of(found))
+        path = self._file_of(found)
+        if self._read is None or self._read[0] != path:
+            self._read = path, load_layer(path)
+        return self._read[1]
 
     def _file_of(self, mesh: int) -> Path:
         if mesh not in self._files:

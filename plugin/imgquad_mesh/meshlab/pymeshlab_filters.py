@@ -8,13 +8,16 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 
 from imgquad_core.errors import InputError
+from imgquad_mesh.spec import find_filter
 
 from .names import pymeshlab_folder
 
 #: a filter that pymeshlab has only when it could load all its plugins
 _LOADED_WHOLE = "meshing_tri_to_quad_by_smart_triangle_pairing"
+_NAMED = re.compile(r"<filter\b[^>]*\bname=[\"']([^\"']*)")
 _PACKAGES = "apt-get install -y --no-install-recommends libgl1 libopengl0"
 _ASK = """
 import json
@@ -54,12 +57,34 @@ def answer() -> str:
     """Return what pymeshlab prints of its filters and their parameters."""
     if pymeshlab_folder() is None:
         raise MissingMeshLab("pymeshlab is not installed; pip install 'imgquad-mesh[meshlab]'")
-    command = [sys.executable, "-c", _ASK]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, errors="replace", check=False)
-    if done.returncode:
-        reason = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+    process = _asking()
+    printed, errors = process.communicate(timeout=120)
+    if process.returncode:
+        reason = (errors.strip().splitlines() or [f"exit code {process.returncode}"])[-1]
         raise MissingMeshLab(f"pymeshlab cannot be imported ({reason}); {_PACKAGES}")
-    return done.stdout
+    return printed
+
+
+@cache
+def _asking() -> subprocess.Popen[str]:
+    pipe = subprocess.PIPE
+    return subprocess.Popen([sys.executable, "-c", _ASK], stdout=pipe, stderr=pipe, text=True, errors="replace")
+
+
+def ask_early(script: Path) -> None:
+    """Begin to ask if a script seems to need it, while what runs scripts is imported. Whatever is wrong is told later.
+
+    Parameters
+    ----------
+    script : Path
+        A file that may be none.
+    """
+    try:
+        names = _NAMED.findall(script.read_text(encoding="utf-8", errors="replace"))
+        if pymeshlab_folder() is not None and any(find_filter(name) is None for name in names):
+            _asking()
+    except OSError:
+        pass
 
 
 @cache

@@ -119,7 +119,8 @@ def test_missing_picture_is_named(tmp_path: Path) -> None:
 
 @pytest.fixture
 def asked_anew() -> Any:
-    asked = (pymeshlab_filters.answer, pymeshlab_filters.meshlab_filters, pymeshlab_filters.meshlab_parameters)
+    names = ("_asking", "answer", "meshlab_filters", "meshlab_parameters")
+    asked = [getattr(pymeshlab_filters, name) for name in names]
     for function in asked:
         function.cache_clear()
     yield
@@ -128,6 +129,19 @@ def asked_anew() -> Any:
 
 
 HALF = "def filter_list(): return ['create_cube'] * 235\ndef print_filter_parameter_list(*_): pass"
+
+
+@pytest.mark.usefixtures("asked_anew")
+@pytest.mark.parametrize(
+    ("script", "asks"),
+    [(MESH, 0), (MESH + filter_xml("Laplacian Smooth"), 1), ("no script <filter name=", 0)],
+)
+def test_pymeshlab_is_asked_early_where_a_script_needs_it(script: str, asks: int, tmp_path: Path) -> None:
+    path = tmp_path / "script.mlx"
+    path.write_text(script, encoding="utf-8")
+    pymeshlab_filters.ask_early(path)
+    pymeshlab_filters.ask_early(tmp_path / "none.mlx")
+    assert pymeshlab_filters._asking.cache_info().currsize == asks
 
 
 @pytest.mark.usefixtures("asked_anew")
