@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from imgquad_core import ahead
-from imgquad_core.arrays import Flags, Floats, Ints, Labels
+from imgquad_core.arrays import Flags, Floats, Ints, Labels, read_only
 from imgquad_core.chains import any_of_chain, edges_of_chains, without_unused_points
 from imgquad_core.cleanup.faces import FaceQuads, joined, stitched
 from imgquad_core.cleanup.options import Portions
@@ -106,7 +106,7 @@ def _slid(mesh: QuadMesh, shape: tuple[int, int], rounds: int, threads: int, por
 def _slid_but(mesh: QuadMesh, held: Flags, rounds: int, threads: int, portions: Portions) -> QuadMesh:
     points, gone = mesh.points.copy(), np.zeros(mesh.n_points)
     rings, (groups, seams) = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads, portions)
-    kind = np.where(held, np.uint8(PointKind.HELD), mesh.point_kind)
+    kind = read_only(np.where(held, PointKind.HELD, mesh.point_kind), np.uint8)  # else compiled once more
 
     def move(how: Callable[[Flags], object]) -> None:
         in_threads(groups, how, threads)
