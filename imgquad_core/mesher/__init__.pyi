@@ -1,11 +1,15 @@
 from .efforts import EFFORTS
-from .meshing import mesh_boundaries
+from .meshing import Filled, fill_faces, mesh_boundaries
 from .options import MeshingOptions
+from .strides import WIDEST
 from .triangulators import triangulator_used
 
 __all__ = [
     "EFFORTS",
+    "WIDEST",
+    "Filled",
     "MeshingOptions",
+    "fill_faces",
     "mesh_boundaries",
     "triangulator_used",
 ]

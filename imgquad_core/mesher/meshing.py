@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,14 +33,21 @@ from .options import MeshingOptions
 from .outline import coarse_segments, with_short_chains_halved
 from .progress import Progress
 from .refits import State, with_musts, with_wishes
-from .strides import LEAST_WIDTH, consistent, mesh_faces
+from .strides import LEAST_WIDTH, WIDEST, consistent, mesh_faces
 
 STUB = 0.1  # of the longest edge at a node: a shorter one is lengthened in the end
 LEAST = 0.5  # scaled Jacobian that is left by it, or the worst of the mesh where that is better
 FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60 degrees give .866
 
 
-@ahead.compiling
+class Filled(NamedTuple):
+    """A mesh, and on which stride each face was meshed."""
+
+    mesh: QuadMesh
+    stride: Ints  #: (n_faces,)
+    fell: Flags  #: (n_faces,) those that were worse on a wider one
+
+
 def mesh_boundaries(
     graph: BoundaryGraph,
     options: MeshingOptions | None = None,
@@ -70,16 +78,30 @@ def mesh_boundaries(
     TopologyError
         If the chains cross, or one has an odd number of edges.
     """
-    options = options or MeshingOptions()
+    return fill_faces(graph, options or MeshingOptions(), materials, told).mesh
+
+
+@ahead.compiling
+def fill_faces(
+    graph: BoundaryGraph,
+    options: MeshingOptions,
+    materials: Materials | None = None,
+    told: Callable[[float], None] | None = None,
+    widest: Ints | None = None,
+) -> Filled:
+    """Do what `mesh_boundaries` does, with no face on a stride above its `widest`; tell also their strides."""
     if (odd := np.flatnonzero(edges_of_chains(graph) % 2)).size:
         raise TopologyError(f"chain {odd[0]} has {edges_of_chains(graph)[odd[0]]} edges: give each an even number")
     graph = consistent(graph, np.ones(graph.n_chains, bool), options.triangulator)
     graph = with_short_chains_halved(graph, LEAST_WIDTH)
     progress = Progress(graph.region_pixels / options.face_sizes(graph.region_label) ** 2, told) if told else None
-    state = State(graph, mesh_faces(graph, np.ones(len(graph.region_label), bool), options, progress))
+    n = len(graph.region_label)
+    widest = np.full(n, WIDEST) if widest is None else widest
+    state = State(graph, mesh_faces(graph, np.ones(n, bool), options, widest, progress), widest)
     state = with_musts(with_wishes(state, options), options)
     mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
-    return _slid(mesh, graph.shape, EFFORTS[options.effort].slides, options.n_threads, options.tuning.portions)
+    slid = _slid(mesh, graph.shape, EFFORTS[options.effort].slides, options.n_threads, options.tuning.portions)
+    return Filled(slid, state.meshed.stride, state.meshed.fell)
 
 
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:

@@ -15,7 +15,7 @@ from imgquad_core.model import BoundaryGraph
 
 from .efforts import Tuning
 from .options import MeshingOptions
-from .strides import Meshed, consistent, faces_beside, faces_of, judged, mesh_faces
+from .strides import Meshed, consistent, faces_beside, judged, mesh_faces, taken
 
 PATIENCE = 6  # rounds that reach no farther than the edges beside the quads
 
@@ -25,6 +25,7 @@ class State(NamedTuple):
 
     graph: BoundaryGraph
     meshed: Meshed
+    widest: Ints  #: stride of each face
 
 
 def with_wishes(state: State, options: MeshingOptions) -> State:
@@ -66,22 +67,18 @@ def _refitted(state: State, finer: BoundaryGraph, options: MeshingOptions) -> St
 
     Where quads fold, the new state is kept in any case.
     """
-    graph, meshed = state
+    graph, meshed, widest = state
     finer = consistent(finer, _differ(graph, finer), options.triangulator)
     changed = _differ(graph, finer)
     todo = faces_beside(graph, changed)
-    done = mesh_faces(finer, todo, options)
+    done = mesh_faces(finer, todo, options, widest)
     group = _groups_across(graph, changed)
     old, new = np.ones((2, len(todo)))
     np.minimum.at(old, group, meshed.worst)
     np.minimum.at(new, group, np.where(todo, done.worst, 1.0))
     better = todo & ((new > old) | (old <= 0.0))[group]
-    parts = faces_of(meshed.parts, ~better) + faces_of(done.parts, better)
     kept = changed & np.append(better, False)[graph.chain_regions].any(axis=1)
-    return State(
-        with_chains_of(graph, finer, kept),
-        Meshed(parts, meshed.faces, np.where(better, done.worst, meshed.worst)),
-    )
+    return State(with_chains_of(graph, finer, kept), taken(meshed, done, better), widest)
 
 
 def _groups_across(graph: BoundaryGraph, chains: Flags) -> Ints:

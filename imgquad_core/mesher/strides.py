@@ -35,6 +35,7 @@ from .splitting import split_composed
 from .triangulation import Triangles, constraint_table, triangulate
 from .warm_up import compile_last_stages
 
+WIDEST = 6  # stride there is
 LEAST_WIDTH = 3.0  # of a face that is meshed on stride 4, in its coarse segments
 EVEN = {4: 0.6, 6: 0.8}  # of the size inside, mean edge around a face at a stride: within it the size hardly grows
 ENOUGH = 0.65  # worst element from which a face is not tried with a smaller stride
@@ -59,6 +60,8 @@ class Meshed(NamedTuple):
     parts: list[FaceQuads]
     faces: Flags  #: which
     worst: Floats  #: scaled Jacobian of each of them, 1 for others
+    stride: Ints  #: of each of them
+    fell: Flags  #: whether they were worse on a wider one
 
 
 def faces_of(parts: list[FaceQuads], faces: Flags) -> list[FaceQuads]:
@@ -83,25 +86,40 @@ def consistent(graph: BoundaryGraph, new: Flags, triangulator: str) -> BoundaryG
     raise TopologyError("the boundaries of the regions cross or contradict each other")
 
 
-def mesh_faces(graph: BoundaryGraph, todo: Flags, options: MeshingOptions, progress: Progress | None = None) -> Meshed:
-    """Mesh flagged faces, each on its stride."""
+def mesh_faces(
+    graph: BoundaryGraph, todo: Flags, options: MeshingOptions, widest: Ints, progress: Progress | None = None
+) -> Meshed:
+    """Mesh flagged faces, each on its stride, none wider than its `widest`."""
     effort = EFFORTS[options.effort]
-    best = Meshed([], np.zeros(len(todo), bool), np.full(len(todo), -np.inf))
+    best = _nothing(np.zeros(len(todo), bool))._replace(worst=np.full(len(todo), -np.inf))
     rim = mean_edges(graph) / options.face_sizes(graph.region_label)
     if effort.in_nine:
-        wide = todo & wide_faces(graph, 6, options.tuning.very_wide) & (rim > EVEN[6])
+        wide = todo & (widest >= 6) & wide_faces(graph, 6, options.tuning.very_wide) & (rim > EVEN[6])
         best = _better(best, _mesh_wide(graph, wide, 6, effort.wide, options, progress))
-    wide = todo & wide_faces(graph, 4, LEAST_WIDTH) & (rim >= EVEN[4]) & (best.worst < ENOUGH)
+    wide = todo & (widest >= 4) & wide_faces(graph, 4, LEAST_WIDTH) & (rim >= EVEN[4]) & (best.worst < ENOUGH)
     best = _better(best, _mesh_wide(graph, wide, 4, effort.wide, options, progress))
     enough = np.where(_large_faces(best), min(options.tuning.worst, effort.again_below), effort.again_below)
     return _better(best, _mesh_at_stride(graph, todo & (best.worst < enough), 2, effort.narrow, options, progress))
 
 
+def _nothing(faces: Flags) -> Meshed:
+    n = len(faces)
+    return Meshed([], faces, np.ones(n), np.zeros(n, np.int64), np.zeros(n, bool))
+
+
 def _better(one: Meshed, other: Meshed) -> Meshed:
     """Take each face from where its worst element is better, the first one if none is."""
     better = other.faces & (other.worst > one.worst)
-    parts = faces_of(one.parts, ~better) + faces_of(other.parts, better)
-    return Meshed(parts, one.faces | other.faces, np.where(better, other.worst, one.worst))
+    return taken(one, other, better)._replace(
+        faces=one.faces | other.faces, fell=np.where(better, one.faces | other.fell, one.fell)
+    )
+
+
+def taken(one: Meshed, other: Meshed, which: Flags) -> Meshed:
+    """Take some faces from the other one."""
+    parts = faces_of(one.parts, ~which) + faces_of(other.parts, which)
+    worst, stride, fell = (np.where(which, b, a) for a, b in zip(one[2:], other[2:], strict=True))
+    return Meshed(parts, one.faces, worst, stride, fell)
 
 
 def _large_faces(meshed: Meshed) -> Flags:
@@ -126,9 +144,8 @@ def _mesh_at_stride(
     graph: BoundaryGraph, faces: Flags, stride: int, how: CleanUp, options: MeshingOptions, progress: Progress | None
 ) -> Meshed:
     """Mesh the flagged faces from segments of `stride` edges."""
-    worst = np.ones(len(faces))
     if not faces.any():
-        return Meshed([], faces, worst)
+        return _nothing(faces)
     portions = options.tuning.portions
     groups = _groups_of(graph, faces, options.face_sizes(graph.region_label) * stride)
     ahead.wait()
@@ -146,9 +163,9 @@ def _mesh_at_stride(
     batches = [batch for group in composed for batch in group]
     task = Task(graph.points, stride // 2, table, how, options.n_threads, portions)
     parts = finished(batches, task, progress.finished if progress else None)
-    told = [judged(part, graph) for part in parts]
+    told, worst = [judged(part, graph) for part in parts], np.ones(len(faces))
     in_threads(told, lambda part: lower_to_worst(part.points, part.quads, part.face, worst), options.n_threads)
-    return Meshed(parts, faces, worst)
+    return Meshed(parts, faces, worst, np.where(faces, stride, 0), np.zeros(len(faces), bool))
 
 
 def judged(part: FaceQuads, graph: BoundaryGraph) -> FaceQuads:

@@ -11,7 +11,7 @@ from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.measures.quality import scaled_jacobian
-from imgquad_core.mesher import MeshingOptions, mesh_boundaries
+from imgquad_core.mesher import MeshingOptions, fill_faces
 from imgquad_core.mesher.strides import near_seams
 from imgquad_core.model import VOID, PointKind, QuadMesh
 
@@ -42,9 +42,11 @@ class Wished(NamedTuple):
 
     mesh: TileMesh | None  #: None where faces cannot be filled without that
     chains: Flags
+    stride: Ints  #: of each face, 0 if there is no mesh
+    fell: Flags  #: those that were worse on a wider one
 
 
-def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: MeshingOptions) -> Wished:
+def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: MeshingOptions, widest: Ints) -> Wished:
     """Mesh the faces of a tile.
 
     Parameters
@@ -57,20 +59,24 @@ def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: Meshing
         Of the picture.
     options : MeshingOptions
         How faces are filled.
+    widest : int64, shape (n_faces,)
+        Stride that each is meshed on at most.
     """
-    if len(outlines.region) == 0:
+    n = len(outlines.region)
+    failed = Wished(None, outlines.shared, np.zeros(n, np.int64), np.zeros(n, bool))
+    if n == 0:
         none = np.empty(0, np.int64)
-        return Wished(TileMesh(np.empty((0, 2)), none.reshape(0, 4), none, np.empty(0, bool)), outlines.shared)
+        return failed._replace(mesh=TileMesh(np.empty((0, 2)), none.reshape(0, 4), none, np.empty(0, bool)))
     try:
-        mesh = mesh_boundaries(graph_of(outlines, window, n_rows), options)
+        mesh, stride, fell = fill_faces(graph_of(outlines, window, n_rows), options, widest=widest)
     except TopologyError:
-        return Wished(None, outlines.shared)
+        return failed
     seam = np.zeros(mesh.n_points, bool)
     for c in np.flatnonzero(outlines.seam):
         seam[mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]] = True
     shift = np.array([window[0], n_rows - window[3]], float)
     made = TileMesh(mesh.points + shift, mesh.quads, outlines.region[mesh.quad_region], seam)
-    return Wished(made, _wished(mesh, options.tuning.worst))
+    return Wished(made, _wished(mesh, options.tuning.worst), stride, fell)
 
 
 def _wished(mesh: QuadMesh, worst: float) -> Flags:

@@ -6,7 +6,8 @@
     labels     tile          materials without noise
     regions    tile          its regions, and once more: those of the picture, whole or cut
     outlines   tile          smoothed chains around its faces
-    mesh       tile          quads; again where shared edges are to be halved
+    mesh       tile          quads; again where shared edges are to be halved, or a piece is on too wide a stride
+    strides    once          after the first time: the widest that no piece of a cut region is poor on
     band       2, 4 tiles    clean-up across seams, in three rounds
     finish     tile          all patches in, its share of the report
     number     tile          which nodes are its own
@@ -31,6 +32,7 @@ from imgquad_core.arrays import Floats, Ints, Labels
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.fe import FEMesh
 from imgquad_core.measures.quality import quad_areas, scaled_jacobian
+from imgquad_core.mesher import WIDEST
 from imgquad_core.model import VOID
 from imgquad_core.options import MeshOptions
 from imgquad_core.picture import (
@@ -57,7 +59,7 @@ from .sources import Source, sample_boxes
 
 NOISE_REACH = 64  #: px around a tile that noise removal sees, beside the shortest length that stays
 CORNER_REACH = 5  #: data points around a tile that tell what is joined over corners
-ATTEMPTS = 3  #: at a tile: the later ones only where edges that it shares are to be halved
+ATTEMPTS = 3  #: at a tile: the later ones only where edges that it shares are to be halved, or strides are too wide
 BINS = 1000  #: of scaled Jacobians from 0 to 1
 
 
@@ -251,6 +253,8 @@ def _outlines_of(job: Job, t: int) -> Outlines:
 def mesh(job: Job, t: int, attempt: int, *_: Any) -> None:
     """Mesh the faces of a tile, with the shared chains halved that it or a neighbour has wished for before.
 
+    All pieces of a region get the stride that the region as a whole would: the one that none of them is poor on.
+
     Raises
     ------
     TopologyError
@@ -261,17 +265,22 @@ def mesh(job: Job, t: int, attempt: int, *_: Any) -> None:
         return
     mine = _outlines_of(job, t)
     asked = [_halved_before(job, t, mine, k) for k in (attempt - 1, attempt)]
+    widest = _widest(job, mine.region, attempt)
     if attempt > 0 and asked[0] == asked[1]:
-        save_arrays(path, chains=np.empty((0, 4), np.int64), made=load_arrays(job.path("wish", t, attempt - 1))["made"])
-        return
+        before = load_arrays(job.path("wish", t, attempt - 1))
+        if (before["stride"] <= widest).all():
+            save_arrays(path, **before | {"chains": np.empty((0, 4), np.int64)})
+            return
     rules, grid = job.rules(), job.grid
     found = settled(t, mine, lambda other: _outlines_of(job, other), asked[1])
-    made = mesh_outlines(found, grid.window(t), grid.shape[0], rules.options.meshing(rules.legend.materials))
+    how = rules.options.meshing(rules.legend.materials)
+    made = mesh_outlines(found, grid.window(t), grid.shape[0], how, widest)
     if made.mesh is not None:
         save_arrays(job.path("mesh", t, attempt), **made.mesh._asdict())
     elif attempt == ATTEMPTS - 1 or not mine.shared.any():
         raise TopologyError(f"tile {grid.place(t)} cannot be filled between its neighbours")
-    save_arrays(path, chains=mine.key[made.chains & mine.shared], made=attempt)
+    chains = mine.key[made.chains & mine.shared]
+    save_arrays(path, chains=chains, made=attempt, region=mine.region, stride=made.stride, fell=made.fell)
 
 
 def _halved_before(job: Job, t: int, mine: Outlines, attempt: int) -> set[tuple[int, ...]]:
@@ -281,6 +290,31 @@ def _halved_before(job: Job, t: int, mine: Outlines, attempt: int) -> set[tuple[
     for other in job.grid.around(t):
         for k in range(attempt):
             found |= {tuple(key) for key in load_arrays(job.path("wish", other, k))["chains"].tolist()} & keys
+    return found
+
+
+def strides(job: Job, *_: Any) -> None:
+    """Find the stride that all pieces of each region can be meshed on."""
+    path = job.path("strides")
+    if path.exists():
+        return
+    is_cut = _regions_of(job).is_cut
+    found = np.full(len(is_cut), WIDEST)
+    for t in range(job.grid.n_tiles):
+        made = load_arrays(job.path("wish", t, 0))
+        here = made["fell"] & is_cut[made["region"]]
+        np.minimum.at(found, made["region"][here], made["stride"][here])
+    narrow = np.flatnonzero(found < WIDEST)
+    save_arrays(path, region=narrow, widest=found[narrow])
+
+
+def _widest(job: Job, region: Ints, attempt: int) -> Ints:
+    """Return the stride that faces of some regions are meshed on at most."""
+    found = np.full(len(region), WIDEST)
+    if attempt > 0:
+        known = load_arrays(job.path("strides"))
+        limits = dict(zip(known["region"].tolist(), known["widest"].tolist(), strict=True))
+        found[:] = [limits.get(number, WIDEST) for number in region.tolist()]
     return found
 
 

@@ -264,9 +264,10 @@ def _steps(job: Job, stored: Any, form: str) -> Iterator[Step]:
         yield Step(f"outlines-{t}", Guarded(work.outlines), (job, t, Result("join")))
     for t in every:
         yield Step(f"mesh-{t}-0", Guarded(work.mesh), (job, t, 0, after("outlines", grid.around(t))))
+    yield Step("strides", work.strides, (job, [Result(f"mesh-{t}-0") for t in every]))
     for k in range(1, work.ATTEMPTS):
         for t in every:
-            needs = [Result(f"mesh-{other}-{k - 1}") for other in grid.around(t)]
+            needs = [Result("strides"), *(Result(f"mesh-{other}-{k - 1}") for other in grid.around(t))]
             yield Step(f"mesh-{t}-{k}", Guarded(work.mesh), (job, t, k, needs))
     yield from _band_steps(job)
     for t in every:

@@ -134,8 +134,10 @@ def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypa
     first, last = int(graph.region_label.argmin()), int(graph.region_label.argmax())
     rounds: list[set[int]] = []
 
-    def pretended(graph: BoundaryGraph, todo: Any, options: MeshingOptions, _: object = None) -> strides.Meshed:
-        done = mesh_faces(graph, todo, options)
+    def pretended(
+        graph: BoundaryGraph, todo: Any, options: MeshingOptions, widest: Any, _: object = None
+    ) -> strides.Meshed:
+        done = mesh_faces(graph, todo, options, widest)
         worst = np.full(len(todo), 0.95)
         worst[first], worst[last] = (0.95, 0.2) if rounds else (0.3, 0.3)
         rounds.append(set(np.flatnonzero(todo).tolist()))
@@ -179,7 +181,7 @@ def test_every_face_has_quads_however_bad_they_are(monkeypatch: pytest.MonkeyPat
     everything = np.ones(len(graph.region_label), bool)
     monkeypatch.setattr(strides, "lower_to_worst", worst_there_is)
     for effort in EFFORTS:
-        done = strides.mesh_faces(graph, everything, MeshingOptions(size=2.0, effort=effort))
+        done = strides.mesh_faces(graph, everything, MeshingOptions(size=2.0, effort=effort), 6 * everything)
         faces = np.concatenate([np.unique(part.face) for part in done.parts])
         assert sorted(faces.tolist()) == list(range(len(everything)))
 

@@ -22,6 +22,7 @@ from imgquad_core.fe.sets import BORDERS
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.model import PointKind
 from imgquad_core.tiles import tasks
+from imgquad_core.tiles.files import load_arrays
 from imgquad_core.writers import safe_names, write_mesh
 from imgquad_mesh.__main__ import main
 from imgquad_mesh.datasets.field_texts import texts_of
@@ -131,6 +132,21 @@ def test_layers_that_run_along_seams_are_as_good_as_without(tmp_path: Path) -> N
     assert shares[0] < shares[1] + 0.008
     assert means[0] > means[1] - 0.004
     assert worst[0] > 0.6
+
+
+def test_all_pieces_of_a_region_have_the_stride_of_the_worst(tmp_path: Path) -> None:
+    """A matrix with discs in one tile only: its piece in the other one is good enough on a wider stride."""
+    rng, (y, x) = np.random.default_rng(6), np.mgrid[:TILE, : 2 * TILE] + 0.5
+    labels = np.zeros(x.shape, np.uint8)
+    for row, column in np.ndindex(7, 7):
+        cx, cy = 62 * column + rng.uniform(22, 40), 62 * row + rng.uniform(22, 40)
+        labels[np.hypot(x - cx, y - cy) < rng.uniform(6, 22)] = 1
+    job = meshed(labels, tmp_path / "out").job
+    first = [load_arrays(job.path("wish", t, 0)) for t in (0, 1)]
+    last = [load_arrays(job.path("wish", t, tasks.ATTEMPTS - 1)) for t in (0, 1)]
+    assert [int(row["stride"][row["region"] == 0].item()) for row in first] == [2, 4]
+    assert [int(row["stride"][row["region"] == 0].item()) for row in last] == [2, 2]
+    assert [int(row["made"]) for row in last] == [0, 1]  # one is as it was
 
 
 def band_figures(mesh: core.QuadMesh) -> tuple[float, float, float]:
