@@ -96,7 +96,7 @@ def smooth_chains(
     room = np.zeros(len(curves.raw))
     room[real.kept] = _room(real.curves, is_corner[real.kept], options.max_shift, threads)
     node = place_junctions(curves, real.ends, room, chains.graph.shape)
-    smooth = _smooth(curves, node, is_corner, room, threads)
+    smooth = _smooth(curves, node, is_corner, room, is_seam, threads)
     lay_seams(smooth, curves, is_seam, SEAM_ROOM * options.size / true.unit)
     if true.extent != chains.graph.shape:
         curves, ends, node, smooth = stretch(curves, ends, node, smooth, chains.graph.shape, true.extent)
@@ -181,12 +181,12 @@ def _room(curves: Curves, is_corner: Flags, max_shift: float, threads: int) -> F
     return np.asarray(np.minimum(free, np.where(is_corner, 1.0, _SHARE) * max_shift * curves.scale))
 
 
-def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats, threads: int) -> Floats:
-    """Smooth all chains between their moved ends and corners, within `room` of the pixel boundary."""
+def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats, is_seam: Flags, threads: int) -> Floats:
+    """Smooth all chains but seams between their moved ends and corners, within `room` of the pixel boundary."""
     pinned = curves.raw.copy()
     place_corners(curves, is_corner, room, pinned)
     pin_ends(pinned, curves, node)
-    pieces, closed = _pieces(curves, is_corner)
+    pieces, closed = _pieces(curves, is_corner, curves.is_frame | is_seam)
     fitted = fit_pieces(
         pinned, curves.arc, curves.weight, curves.scale, pieces, closed, np.array(WINDOWS), threads=threads
     )
@@ -197,13 +197,13 @@ def _smooth(curves: Curves, node: Floats, is_corner: Flags, room: Floats, thread
     return smooth
 
 
-def _pieces(curves: Curves, is_corner: Flags) -> tuple[Ints, Flags]:
-    """Find the first and last dense point of each piece between corners, off the border; tell which are whole loops."""
+def _pieces(curves: Curves, is_corner: Flags, straight: Flags) -> tuple[Ints, Flags]:
+    """Find both end points of each piece between corners, of chains that are not straight; tell which are loops."""
     is_cut = is_corner.copy()
     is_cut[curves.offsets[:-1]] = is_cut[curves.offsets[1:] - 1] = True
     cuts = np.flatnonzero(is_cut)
     chain = np.searchsorted(curves.offsets, cuts, side="right") - 1
-    inner = (chain[1:] == chain[:-1]) & ~curves.is_frame[chain[:-1]]
+    inner = (chain[1:] == chain[:-1]) & ~straight[chain[:-1]]
     pieces = np.stack([cuts[:-1], cuts[1:]], axis=1)[inner]
     return pieces, ((curves.ends[:, 0] < 0)[chain[:-1]] & ~is_corner[cuts[:-1]])[inner]
 

@@ -88,8 +88,12 @@ def fill_faces(
     materials: Materials | None = None,
     told: Callable[[float], None] | None = None,
     widest: Ints | None = None,
+    once: Flags | None = None,
 ) -> Filled:
-    """Do what `mesh_boundaries` does, with no face on a stride above its `widest`; tell also their strides."""
+    """Do what `mesh_boundaries` does, with no face on a stride above its `widest`; tell also their strides.
+
+    Faces flagged `once` are not tried again on a stride that they were worse on, when edges beside them are halved.
+    """
     if (odd := np.flatnonzero(edges_of_chains(graph) % 2)).size:
         raise TopologyError(f"chain {odd[0]} has {edges_of_chains(graph)[odd[0]]} edges: give each an even number")
     graph = consistent(graph, np.ones(graph.n_chains, bool), options.triangulator)
@@ -97,11 +101,12 @@ def fill_faces(
     progress = Progress(graph.region_pixels / options.face_sizes(graph.region_label) ** 2, told) if told else None
     n = len(graph.region_label)
     widest = np.full(n, WIDEST) if widest is None else widest
-    state = State(graph, mesh_faces(graph, np.ones(n, bool), options, widest, progress), widest)
+    meshed = mesh_faces(graph, np.ones(n, bool), options, widest, progress)
+    state = State(graph, meshed, widest if once is None else np.where(once & meshed.fell, meshed.stride, widest))
     state = with_musts(with_wishes(state, options), options)
     mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
     slid = _slid(mesh, graph.shape, EFFORTS[options.effort].slides, options.n_threads, options.tuning.portions)
-    return Filled(slid, state.meshed.stride, state.meshed.fell)
+    return Filled(slid, state.meshed.stride, state.meshed.fell | (state.widest < widest))
 
 
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:

@@ -33,7 +33,7 @@ from imgquad_core.model import Materials
 from imgquad_core.tracing import trace_mesh
 
 from .grid import BAND, CLEAR, CORNER, Grid
-from .meshes import Patch, TileMesh, joined_meshes
+from .meshes import Patch, TileMesh, joined_meshes, part_of
 
 SEEDS = 8  #: quads from the seam within which irregular nodes are looked at
 PASSES = (CleanUp((40, 160, 600), 0.5, 0.6), CleanUp((16, 40, 80, 160), 0.5, 0.6))
@@ -95,7 +95,10 @@ def cleaned_band(
     is_place : callable
         Tells the places whose seams count.
     """
-    whole, tile, place = joined_meshes(meshes)
+    near = [nodes_around(mesh.quads, mesh.seam & is_place(mesh.points), BAND + 1) for mesh in meshes]
+    beside_seams = [flags[mesh.quads].any(axis=1) for flags, mesh in zip(near, meshes, strict=True)]
+    whole, tile = joined_meshes([part_of(mesh, which) for mesh, which in zip(meshes, beside_seams, strict=True)])
+    place = np.concatenate([np.flatnonzero(which) for which in beside_seams])
     shared = _in_several(whole.quads, np.repeat(tile[:, None], 4, axis=1), len(whole.points))
     seam = whole.seam & shared & is_place(whole.points)
     if not seam.any():

@@ -50,9 +50,10 @@ class Grid(NamedTuple):
         left, upper, right, lower = box
         return max(left, 0), max(upper, 0), min(right, self.shape[1]), min(lower, self.shape[0])
 
-    def window(self, t: int) -> Box:
-        """Return what a tile must see to know all boundaries around its faces."""
-        return self.box(t, CONTEXT + self.keep)
+    def window(self, faces: Box) -> Box:
+        """Return what a tile must see to know all boundaries around faces within a box."""
+        left, upper, right, lower = faces
+        return self.clipped((left - CONTEXT, upper - CONTEXT, right + CONTEXT, lower + CONTEXT))
 
     def tiles_in(self, box: Box) -> list[int]:
         """Return the tiles that a box touches, in their order."""

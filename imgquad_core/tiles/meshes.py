@@ -15,8 +15,7 @@ from imgquad_core.mesher import MeshingOptions, fill_faces
 from imgquad_core.mesher.strides import near_seams
 from imgquad_core.model import VOID, PointKind, QuadMesh
 
-from .grid import Box
-from .outlines import Outlines, graph_of
+from .outlines import Outlines, corner_of, graph_of
 
 
 class TileMesh(NamedTuple):
@@ -46,21 +45,21 @@ class Wished(NamedTuple):
     fell: Flags  #: those that were worse on a wider one
 
 
-def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: MeshingOptions, widest: Ints) -> Wished:
+def mesh_outlines(outlines: Outlines, n_rows: int, options: MeshingOptions, widest: Ints, is_cut: Flags) -> Wished:
     """Mesh the faces of a tile.
 
     Parameters
     ----------
     outlines : Outlines
         From `settled`.
-    window : tuple of int
-        Left, upper, right, lower bound of what the tile sees.
     n_rows : int
         Of the picture.
     options : MeshingOptions
         How faces are filled.
     widest : int64, shape (n_faces,)
         Stride that each is meshed on at most.
+    is_cut : bool, shape (n_faces,)
+        Pieces of regions: one that is worse on a wide stride has decided for the region.
     """
     n = len(outlines.region)
     failed = Wished(None, outlines.shared, np.zeros(n, np.int64), np.zeros(n, bool))
@@ -68,14 +67,13 @@ def mesh_outlines(outlines: Outlines, window: Box, n_rows: int, options: Meshing
         none = np.empty(0, np.int64)
         return failed._replace(mesh=TileMesh(np.empty((0, 2)), none.reshape(0, 4), none, np.empty(0, bool)))
     try:
-        mesh, stride, fell = fill_faces(graph_of(outlines, window, n_rows), options, widest=widest)
+        mesh, stride, fell = fill_faces(graph_of(outlines, n_rows), options, widest=widest, once=is_cut)
     except TopologyError:
         return failed
     seam = np.zeros(mesh.n_points, bool)
     for c in np.flatnonzero(outlines.seam):
         seam[mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]] = True
-    shift = np.array([window[0], n_rows - window[3]], float)
-    made = TileMesh(mesh.points + shift, mesh.quads, outlines.region[mesh.quad_region], seam)
+    made = TileMesh(mesh.points + corner_of(outlines, n_rows), mesh.quads, outlines.region[mesh.quad_region], seam)
     return Wished(made, _wished(mesh, options.tuning.worst), stride, fell)
 
 
@@ -100,20 +98,42 @@ def patched(mesh: TileMesh, patches: list[Patch]) -> TileMesh:
     points = np.concatenate([mesh.points, *(patch.points for patch in patches)])
     seam = np.append(mesh.seam, np.zeros(len(points) - len(mesh.points), bool))
     region = np.concatenate([mesh.region[kept], *(patch.region for patch in patches)])
-    return welded(TileMesh(points, np.concatenate(quads), region, seam))
+    near = np.ones(len(points), bool)
+    near[: len(mesh.points)] = _within(mesh.points, [patch.points for patch in patches if len(patch.points)])
+    return welded(TileMesh(points, np.concatenate(quads), region, seam), near)
 
 
-def welded(mesh: TileMesh) -> TileMesh:
-    """Return a mesh with one node at each place that quads use, in the order that nodes come first."""
+def _within(points: Floats, others: list[Floats]) -> Flags:
+    """Tell the points within the bounds of one of several others."""
+    found = np.zeros(len(points), bool)
+    for other in others:
+        found |= ((points >= other.min(axis=0)) & (points <= other.max(axis=0))).all(axis=1)
+    return found
+
+
+def welded(mesh: TileMesh, near: Flags | None = None) -> TileMesh:
+    """Return a mesh with one node at each place that quads use, in the order that nodes come first.
+
+    Places of several nodes are among those `near` only, by default anywhere.
+    """
     used = np.zeros(len(mesh.points), bool)
     used[mesh.quads] = True
-    ids = np.flatnonzero(used)
+    ids = np.flatnonzero(used if near is None else used & near)
     first, node = same_places(mesh.points[ids])
-    new = np.full(len(mesh.points), -1, np.int64)
-    new[ids] = node
-    seam = np.zeros(len(first), bool)
-    np.logical_or.at(seam, node, mesh.seam[ids])
-    return TileMesh(mesh.points[ids[first]], new[mesh.quads], mesh.region, seam)
+    one, seam = np.arange(len(mesh.points)), mesh.seam.copy()
+    one[ids] = ids[first][node]
+    seam[one[ids[mesh.seam[ids]]]] = True
+    kept = used & (one == np.arange(len(one)))
+    new = np.cumsum(kept) - 1
+    return TileMesh(mesh.points[kept], new[one[mesh.quads]], mesh.region, seam[kept])
+
+
+def part_of(mesh: TileMesh, which: Flags) -> TileMesh:
+    """Return some quads of a mesh and their nodes."""
+    used = np.zeros(len(mesh.points), bool)
+    used[mesh.quads[which]] = True
+    new = np.cumsum(used) - 1
+    return TileMesh(mesh.points[used], new[mesh.quads[which]], mesh.region[which], mesh.seam[used])
 
 
 def same_places(points: Floats) -> tuple[Ints, Ints]:
@@ -130,8 +150,8 @@ def bits_of(points: Floats) -> NDArray[np.complex128]:
     return np.ascontiguousarray(points, np.float64).view(np.complex128).ravel()
 
 
-def joined_meshes(meshes: list[TileMesh]) -> tuple[TileMesh, Ints, Ints]:
-    """Put tiles together; return also which one each quad is of, and its place there."""
+def joined_meshes(meshes: list[TileMesh]) -> tuple[TileMesh, Ints]:
+    """Put tiles together; return also which one each quad is of."""
     shift = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     whole = TileMesh(
         np.concatenate([mesh.points for mesh in meshes]),
@@ -139,9 +159,7 @@ def joined_meshes(meshes: list[TileMesh]) -> tuple[TileMesh, Ints, Ints]:
         np.concatenate([mesh.region for mesh in meshes]),
         np.concatenate([mesh.seam for mesh in meshes]),
     )
-    counts = [len(mesh.quads) for mesh in meshes]
-    place = np.concatenate([np.arange(n) for n in counts]) if counts else np.empty(0, np.int64)
-    return welded(whole), np.repeat(np.arange(len(meshes)), counts), place
+    return welded(whole), np.repeat(np.arange(len(meshes)), [len(mesh.quads) for mesh in meshes])
 
 
 def open_nodes(mesh: TileMesh) -> Ints:

@@ -46,6 +46,7 @@ class Outlines(NamedTuple):
     region: Ints  #: (n_faces,)
     label: Labels  #: (n_faces,)
     pixels: Ints  #: (n_faces,)
+    window: Ints  #: (4,) left, upper, right, lower bound of what the tile sees
 
 
 def outlines_of(
@@ -115,6 +116,7 @@ def outlines_of(
         region=keys.region[key_of[faces]],
         label=np.asarray(raw.region_label[faces]),
         pixels=np.asarray(smooth.region_pixels[faces]),
+        window=np.array(window),
     )
 
 
@@ -233,16 +235,21 @@ class _Index(NamedTuple):
         return _Index(nodes, chains)
 
 
-def graph_of(outlines: Outlines, window: Box, n_rows: int) -> BoundaryGraph:
+def corner_of(outlines: Outlines, n_rows: int) -> Floats:
+    """Return x and y of the lower left corner of what a tile sees."""
+    return np.array([outlines.window[0], n_rows - outlines.window[3]], float)
+
+
+def graph_of(outlines: Outlines, n_rows: int) -> BoundaryGraph:
     """Return the boundary of a tile's faces, in the coordinates of its window."""
-    shift = np.array([window[0], n_rows - window[3]], float)
+    left, upper, right, lower = outlines.window.tolist()
     return BoundaryGraph(
-        outlines.points - shift,
+        outlines.points - corner_of(outlines, n_rows),
         outlines.kind,
         outlines.offsets,
         outlines.ids,
         outlines.sides,
         outlines.label,
         outlines.pixels,
-        (window[3] - window[1], window[2] - window[0]),
+        (lower - upper, right - left),
     )

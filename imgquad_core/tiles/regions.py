@@ -49,6 +49,12 @@ class Regions(NamedTuple):
     is_cut: Flags  #: too large to stay whole: each tile has its own piece
     number: Ints  #: number of every tile's regions, tile by tile; -1 for those without own pixels
     offsets: Ints  #: (n_tiles + 1,) where a tile's begin
+    reach: Ints  #: (n_tiles, 4) left, upper, right, lower bound of each tile's faces
+
+    def box_of(self, t: int) -> Box:
+        """Return the bounds of a tile and its faces."""
+        left, upper, right, lower = self.reach[t].tolist()
+        return left, upper, right, lower
 
 
 def tile_regions(
@@ -135,14 +141,11 @@ def joined_regions(grid: Grid, tiles: list[TileRegions]) -> Regions:
     in_tiles = (low // grid.tile != (high - 1) // grid.tile).any(axis=1)
     row, column = first // grid.shape[1] // grid.tile, first % grid.shape[1] // grid.tile
     own = np.concatenate([tile.pixels for tile in tiles]) > 0
-    return Regions(
-        label[order],
-        pixels[order],
-        row * grid.across + column,
-        is_large & in_tiles,
-        np.where(own, number[of], -1),
-        offsets,
-    )
+    owner, is_cut = row * grid.across + column, is_large & in_tiles
+    reach = np.array([grid.box(t) for t in range(grid.n_tiles)])
+    np.minimum.at(reach[:, :2], owner[~is_cut], low[~is_cut])
+    np.maximum.at(reach[:, 2:], owner[~is_cut], high[~is_cut])
+    return Regions(label[order], pixels[order], owner, is_cut, np.where(own, number[of], -1), offsets, reach)
 
 
 def _shared(grid: Grid, t: int, tiles: list[TileRegions], offsets: Ints) -> NDArray[np.int64]:

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints, Labels
+from imgquad_core.cleanup.strips import pieces_at
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.fe import FEMesh
 from imgquad_core.measures.quality import quad_areas, scaled_jacobian
@@ -150,10 +151,7 @@ def _inside(values: Labels, window: Box, box: Box) -> Labels:
 
 
 def _counts(values: Labels, numbers: Labels) -> Ints:
-    found, counts = np.unique(values[values != VOID], return_counts=True)
-    total = np.zeros(len(numbers), np.int64)
-    total[np.searchsorted(numbers, found)] = counts
-    return total
+    return np.bincount(np.searchsorted(numbers, values[values != VOID]), minlength=len(numbers))
 
 
 def _parts_of(job: Job, kind: str, box: Box) -> list[Part]:
@@ -226,7 +224,7 @@ def outlines(job: Job, t: int, *_: Any) -> None:
     if path.exists():
         return
     rules, grid, every = job.rules(), job.grid, _regions_of(job)
-    window = grid.window(t)
+    window = grid.window(every.box_of(t))
     keys = keys_of((window[3] - window[1], window[2] - window[0]), _parts_of(job, "ids", window), grid, every)
     if not (keys.tile == t).any():
         save_arrays(path, **_no_outlines()._asdict())
@@ -242,7 +240,7 @@ def _no_outlines() -> Outlines:
     return Outlines(
         points=np.empty((0, 2)), kind=np.empty(0, np.uint8), offsets=np.zeros(1, np.int64), ids=none,
         sides=none.reshape(0, 2), owner=none, shared=flags, closed=flags, seam=flags, key=none.reshape(0, 4),
-        node=none.reshape(0, 4), region=none, label=np.empty(0, np.int32), pixels=none,
+        node=none.reshape(0, 4), region=none, label=np.empty(0, np.int32), pixels=none, window=np.zeros(4, np.int64),
     )  # fmt: skip
 
 
@@ -271,14 +269,14 @@ def mesh(job: Job, t: int, attempt: int, *_: Any) -> None:
         if (before["stride"] <= widest).all():
             save_arrays(path, **before | {"chains": np.empty((0, 4), np.int64)})
             return
-    rules, grid = job.rules(), job.grid
+    rules = job.rules()
     found = settled(t, mine, lambda other: _outlines_of(job, other), asked[1])
     how = rules.options.meshing(rules.legend.materials)
-    made = mesh_outlines(found, grid.window(t), grid.shape[0], how, widest)
+    made = mesh_outlines(found, job.grid.shape[0], how, widest, _regions_of(job).is_cut[mine.region])
     if made.mesh is not None:
         save_arrays(job.path("mesh", t, attempt), **made.mesh._asdict())
     elif attempt == ATTEMPTS - 1 or not mine.shared.any():
-        raise TopologyError(f"tile {grid.place(t)} cannot be filled between its neighbours")
+        raise TopologyError(f"tile {job.grid.place(t)} cannot be filled between its neighbours")
     chains = mine.key[made.chains & mine.shared]
     save_arrays(path, chains=chains, made=attempt, region=mine.region, stride=made.stride, fell=made.fell)
 
@@ -402,11 +400,7 @@ def _share(job: Job, t: int, made: TileMesh, label: Labels, rim: Ints, areas: Fl
 
 def _between(made: TileMesh, label: Labels) -> Ints:
     """Return the nodes that quads of several materials have."""
-    corners = made.quads.ravel()
-    low, high = np.full(len(made.points), np.iinfo(np.int32).max), np.full(len(made.points), -1)
-    np.minimum.at(low, corners, np.repeat(label, 4))
-    np.maximum.at(high, corners, np.repeat(label, 4))
-    return np.flatnonzero(low < high)
+    return np.flatnonzero(pieces_at(label.astype(np.int64), made.quads, len(made.points))[1])
 
 
 def final_mesh(job: Job, t: int) -> dict[str, Any]:

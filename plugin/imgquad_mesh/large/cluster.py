@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -71,7 +72,7 @@ def run_steps(steps: Iterable[Step], client: Any, told: Told) -> dict[str, Any]:
 
 def _current() -> Any:
     """Return the client of Dask that is current here, None if there is none."""
-    if find_spec("distributed") is None:
+    if "distributed" not in sys.modules:  # nobody has made one; to load it takes longer than many a picture
         return None
     from distributed import default_client  # an extra
 

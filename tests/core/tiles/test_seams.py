@@ -28,7 +28,7 @@ def outlines(labels: np.ndarray, t: int) -> Outlines:
     codes, pixels = np.unique(2 * labels + tile, return_inverse=True)
     keys = Keys(pixels.reshape(SHAPE).astype(np.int32), codes // 2, codes % 2)
     none = np.empty(0, np.int64)
-    known = Regions(np.arange(labels.max() + 1, dtype=np.int32), none, none, np.ones(9, bool), none, none)
+    known = Regions(np.arange(labels.max() + 1, dtype=np.int32), none, none, np.ones(9, bool), none, none, none)
     return outlines_of(t, keys, (0, 0, *SHAPE[::-1]), SHAPE[0], known, ExtractionOptions(), SMOOTHING)
 
 
