@@ -27,6 +27,7 @@ from imgquad_core.cleanup.optimization import (
 from imgquad_core.cleanup.options import CleanUp
 from imgquad_core.cleanup.relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
 from imgquad_core.cleanup.strips import nodes_around
+from imgquad_core.cleanup.worst_quads import repair
 from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.model import Materials
@@ -36,7 +37,8 @@ from .grid import BAND, CLEAR, CORNER, Grid
 from .meshes import Patch, TileMesh, joined_meshes, part_of
 
 SEEDS = 8  #: quads from the seam within which irregular nodes are looked at
-PASSES = (CleanUp((40, 160, 600), 0.5, 0.6), CleanUp((16, 40, 80, 160), 0.5, 0.6))
+PASSES = (CleanUp((40, 160, 600), 1.0, 0.6, 600), CleanUp((40, 160, 600, 1200), 1.0, 0.6, 600))
+POOR = 0.7  #: scaled Jacobian below which single quads are replaced, as in faces
 ROUNDS = ("down", "across", "corner")
 
 
@@ -142,7 +144,7 @@ def _cleaned(whole: TileMesh, quads: Ints, near: Flags) -> tuple[Floats, Ints, I
     seeds = near[used]
     new = old
     for how in PASSES:
-        new = _relaxed(clean_up(_relaxed(new), how, _seeds(new, mesh.points, seeds)))
+        new = _repaired(_relaxed(clean_up(_relaxed(new), how, _seeds(new, mesh.points, seeds))))
     better = _is_better(old, new, len(mesh.region_label))
     made = stitched_onto(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))
     return np.asarray(made.points), np.asarray(made.quads), regions[made.quad_material]
@@ -184,6 +186,12 @@ def _relaxed(part: FaceQuads) -> FaceQuads:
     newton(points, rings, free, NEWTON_SWEEPS, GOOD)
     untangle(points, rings, free, 4, 0.86)
     return part._replace(points=points)
+
+
+def _repaired(part: FaceQuads) -> FaceQuads:
+    """Replace the worst quads: a face tells how good it is without those near seams, so they may be poor."""
+    better, beside = repair(part, POOR)
+    return _relaxed(better) if beside.any() else part
 
 
 def _is_better(old: FaceQuads, new: FaceQuads, n_faces: int) -> Flags:
