@@ -1,6 +1,7 @@
 """How good is a mesh in tiles beside that of the picture as a whole, and what does it cost? Prints a table.
 
-    python benchmarks/large.py                       disks, geology, land cover of 1,024 x 1,024 px
+    python benchmarks/large.py                       disks, geology, land cover, grains of 1,024 x 1,024 px
+    python benchmarks/large.py --only map.png        a picture of flat colours
     python benchmarks/large.py --side 4096 --tile 2048 --workers 2
     python benchmarks/large.py --side 16384 --tile 4096 --workers 2 --no-whole --only disks
 
@@ -68,7 +69,27 @@ def land_cover(side: int) -> np.ndarray:
     return np.searchsorted(bounds, surface.ravel()).reshape(side, side).astype(np.uint8)
 
 
-KINDS = {"disks": disks, "geology": geology, "land cover": land_cover}
+def grains(side: int) -> np.ndarray:
+    """Cells of points at random, some 80 px wide, of seven materials."""
+    from scipy.spatial import cKDTree
+
+    rng = np.random.default_rng(4)
+    points = rng.uniform(0, side, (max(side * side // 6100, 2), 2))
+    material = rng.integers(0, 7, len(points)).astype(np.uint8)
+    pixels = np.indices((side, side)).reshape(2, -1).T + 0.5
+    return material[cKDTree(points).query(pixels)[1]].reshape(side, side)
+
+
+def drawn(path: Path) -> np.ndarray:
+    """A picture of flat colours as labels."""
+    from imgquad_core.reading import ReadOptions, read_picture
+
+    values = np.asarray(read_picture(path, ReadOptions()).values)
+    flat = values.reshape(values.shape[0] * values.shape[1], -1)
+    return np.unique(flat, axis=0, return_inverse=True)[1].reshape(values.shape[:2]).astype(np.uint8)
+
+
+KINDS = {"disks": disks, "geology": geology, "land cover": land_cover, "grains": grains}
 
 
 @contextmanager
@@ -124,7 +145,7 @@ def cracks(mesh: QuadMesh, shape: tuple[int, int]) -> tuple[float, int, int, int
 
 def measure(kind: str, args: argparse.Namespace) -> dict[str, Any]:
     """Mesh a picture in tiles and as a whole."""
-    labels = KINDS[kind](args.side)
+    labels = drawn(Path(kind)) if kind.endswith(".png") else KINDS[kind](args.side)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.npy"
         np.save(path, labels)
@@ -180,7 +201,7 @@ def main() -> None:
     parser.add_argument("--tile", type=int, default=512)
     parser.add_argument("--keep-whole", type=int, default=128)
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--only", choices=KINDS)
+    parser.add_argument("--only", help=f"{', '.join(KINDS)}, or a PNG file of flat colours")
     parser.add_argument("--no-whole", action="store_true")
     parser.add_argument("--log", type=Path)
     args = parser.parse_args()
