@@ -58,7 +58,11 @@ def answer() -> str:
     if pymeshlab_folder() is None:
         raise MissingMeshLab("pymeshlab is not installed; pip install 'imgquad-mesh[meshlab]'")
     process = _asking()
-    printed, errors = process.communicate(timeout=120)
+    try:
+        printed, errors = process.communicate(timeout=120)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        raise
     if process.returncode:
         reason = (errors.strip().splitlines() or [f"exit code {process.returncode}"])[-1]
         raise MissingMeshLab(f"pymeshlab cannot be imported ({reason}); {_PACKAGES}")
