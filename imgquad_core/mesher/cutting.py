@@ -36,7 +36,7 @@ class CutMesh(NamedTuple):
 
 
 class FaceConflict(NamedTuple):
-    """Regions whose outlines contradict each other: a face inside the wrong neighbour."""
+    """Regions whose outlines contradict each other, a face inside the wrong neighbour, or are not all there."""
 
     regions: Ints
 
@@ -47,10 +47,13 @@ def cut_at_constraints(mesh: Triangles, constraints: Constraints) -> CutMesh | F
     Returns
     -------
     CutMesh or FaceConflict
-        The conflict, where the rim of one face names two regions (an island on the wrong side of a chord).
+        The conflict, where the rim of one face names two regions (an island on the wrong side of a chord), or where
+        a constraint is no edge of `mesh`.
     """
     twins = mesh.twins.copy()
-    left, middle = _open_constraints(mesh.triangles, twins, constraints)
+    left, middle, is_edge = _open_constraints(mesh.triangles, twins, constraints)
+    if len(lost := constraints.region[~is_edge & (constraints.region >= 0)]):
+        return FaceConflict(np.unique(lost))
     face, bad = _flood_regions(twins, left)
     if len(bad):
         return FaceConflict(np.unique(bad[bad >= 0]))
@@ -61,8 +64,12 @@ def cut_at_constraints(mesh: Triangles, constraints: Constraints) -> CutMesh | F
 
 
 @kernel
-def _open_constraints(triangles: Ints, twins: Ints, constraints: Constraints) -> tuple[Ints, Ints]:
-    """Set the twins of constraint edges to -1; return for each half-edge the region on its left (-2: none told)."""
+def _open_constraints(triangles: Ints, twins: Ints, constraints: Constraints) -> tuple[Ints, Ints, Flags]:
+    """Set the twins of constraint edges to -1.
+
+    Return for each half-edge the region on its left (-2: none told) and the middle, and which constraints are edges.
+    """
+    is_edge = np.zeros(constraints.head.size, np.bool_)
     left = np.full(twins.size, -2, np.int64)
     middle = np.full(twins.size, -1, np.int64)
     n_tails = constraints.offsets.size - 1
@@ -76,7 +83,8 @@ def _open_constraints(triangles: Ints, twins: Ints, constraints: Constraints) ->
                     left[3 * t + k] = constraints.region[i]
                     middle[3 * t + k] = constraints.middle[i]
                     twins[3 * t + k] = -1
-    return left, middle
+                    is_edge[i] = True
+    return left, middle, is_edge
 
 
 def _flood_regions(twins: Ints, left: Ints) -> tuple[Ints, Ints]:

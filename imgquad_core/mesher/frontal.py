@@ -30,6 +30,7 @@ EXCLUSION = 0.7  # of the local edge length; .6 gives 7.8 % irregular nodes, .65
 SIGHT = 1.6  # edge lengths: points this near tell where they expect a point
 PULL = 0.5  # edge lengths: expectations farther from the end of a spoke do not count
 CELL = 1.4  # edge lengths
+ON_RIM = 1e-6  # of the length of an edge of the rim: a point within it is on the edge, which it would cut in two
 MAX_WALK = 400  # triangles on the way to a spoke's end
 
 
@@ -99,20 +100,22 @@ def _expected_points(points: Floats, triangles: Ints, size: Floats) -> float:
 
 @kernel
 def _walk(mesh_points: Floats, triangles: Ints, twins: Ints, t: int, x: float, y: float) -> int:
-    """Return the triangle that holds (x, y), walking from triangle t without leaving its face; -1 if none does."""
+    """Return the triangle that holds (x, y), walking from triangle t without leaving its face; -1 if none does.
+
+    What is on the rim is in none.
+    """
     for _ in range(MAX_WALK):
         step = np.int64(-1)
         blocked = False
         for k in range(3):
             a, b = triangles[t, k], triangles[t, (k + 1) % 3]
-            side = (mesh_points[b, 0] - mesh_points[a, 0]) * (y - mesh_points[a, 1]) - (
-                mesh_points[b, 1] - mesh_points[a, 1]
-            ) * (x - mesh_points[a, 0])
-            if side < 0.0:
-                if twins[3 * t + k] >= 0:
-                    step = twins[3 * t + k] // 3
-                    break
-                blocked = True
+            along, up = mesh_points[b, 0] - mesh_points[a, 0], mesh_points[b, 1] - mesh_points[a, 1]
+            side = along * (y - mesh_points[a, 1]) - up * (x - mesh_points[a, 0])
+            if twins[3 * t + k] < 0:
+                blocked = blocked or side <= ON_RIM * (along * along + up * up)
+            elif side < 0.0:
+                step = twins[3 * t + k] // 3
+                break
         if step < 0:
             return -1 if blocked else t
         t = int(step)

@@ -74,6 +74,16 @@ def test_outlines_that_name_two_regions_for_one_face_are_a_conflict() -> None:
     assert cut.regions.tolist() == [2, 5]
 
 
+def test_a_side_that_is_no_edge_is_a_conflict() -> None:
+    """A point on it would have cut it in two."""
+    points = np.array([[0.0, 0], [2, 0], [2, 2], [0, 2], [1, 0]])
+    tail, head = np.arange(4), np.array([1, 2, 3, 0])
+    table = constraint_table(4, tail, head, np.full(4, 5), np.full(4, VOID), np.zeros((4, 2), np.int64))
+    cut = cut_at_constraints(triangulate(points, np.stack([tail, head], axis=1)), table)
+    assert isinstance(cut, FaceConflict)
+    assert cut.regions.tolist() == [5]
+
+
 def hourglass() -> BoundaryGraph:
     """A square of region 0 with two triangles of regions 1 and 2 that touch in the middle."""
     square = [[0, 0], [4, 0], [8, 0], [8, 4], [8, 8], [4, 8], [0, 8], [0, 4]]

@@ -302,6 +302,16 @@ def test_void_stays_empty(size: float) -> None:
     assert area == pytest.approx(np.count_nonzero(labels != VOID), rel=0.02)
 
 
+def test_no_point_is_placed_on_the_border() -> None:
+    """A spoke as long as the picture is high ended there: the edge below was lost, and quads went beyond it."""
+    labels = np.zeros((3, 33), np.int32)
+    labels[0, :13], labels[1, :14], labels[2, :15] = 1, 1, 1
+    labels[0, 3], labels[1, 21] = 0, 1
+    image = label_image(labels)
+    options = MeshOptions(size=6.0, material_sizes={0: 2.0}, frame_size=0.8, boundary_size=3.0, max_shift=0.0)
+    assert_valid_mesh(run(image, replace(options, policy="majority")).mesh, image)
+
+
 def test_no_node_slides_over_void_out_of_the_picture() -> None:
     labels = labels_of_kind("void", 38, 16, 2, 565211775)
     made = run(label_image(labels), MeshOptions(size=1.0, tolerance=6.0, periodic="y", pixel_size=(3.0, 1.0)))
