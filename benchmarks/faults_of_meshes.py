@@ -39,8 +39,22 @@ def draw_options(rng: Generator, **more: object) -> dict[str, object]:
     }
 
 
+#: values of options that few trials have
+SOMETIMES: dict[str, tuple[object, ...]] = {
+    "max_shift": (0.0, 0.5),
+    "join": (0.0, 1.0, 4.0, 12.0),
+    "growth": (1.05, 1.2, 2.0),
+    "edge_ratio": (1.05, 1.5, 3.0),
+    "frame_size": (0.8, 3.0, 12.0),
+    "boundary_size": (0.8, 3.0, 12.0),
+    "triangulator": ("cdt",),
+    "min_pixels": (3, 10),
+    "min_length": (2.0, 5.0),
+}
+
+
 def draw_case(rng: Generator) -> tuple[np.ndarray, dict[str, object]]:
-    """Return a picture and options; now and then a periodic cell, a tolerance, materials that are dropped or finer."""
+    """Return a picture and options: most as usual, each now and then another."""
     labels = draw_labels(rng)
     materials = np.unique(labels[labels >= 0])
     more: dict[str, object] = {}
@@ -54,6 +68,14 @@ def draw_case(rng: Generator) -> tuple[np.ndarray, dict[str, object]]:
         more["material_sizes"] = {int(rng.choice(materials)): float(rng.choice([0.7, 2.0, 9.0]))}
     if rng.random() < 0.15:
         more["pixel_size"] = tuple(rng.choice([0.4, 1.0, 1.7, 3.0], 2).tolist())
+    if "tolerance" in more and rng.random() < 0.3 and len(materials):
+        more["keep"] = (int(rng.choice(materials)),)
+    if rng.random() < 0.15 and len(materials) > 1:
+        first, second = rng.choice(materials, 2, replace=False).tolist()
+        more["sizes_between"] = {(first, second): float(rng.choice([0.7, 2.0, 9.0]))}
+    for name, values in SOMETIMES.items():
+        if rng.random() < 0.15:
+            more[name] = values[int(rng.integers(len(values)))]
     return labels, draw_options(rng, **more)
 
 
@@ -104,7 +126,7 @@ def meshes(rng: Generator, folder: Path) -> None:
 
 def judged(labels: np.ndarray, options: MeshOptions) -> Run:
     """Return what a run makes of labels, after judging it."""
-    from imgquad_core import run
+    from imgquad_core import MeshOptions, run
     from support import invariants
     from support.labels import label_image
 
@@ -113,7 +135,8 @@ def judged(labels: np.ndarray, options: MeshOptions) -> Run:
     judge(made.mesh, made.labels, pixel_size=options.pixel_sides)
     invariants.assert_accounted(made)
     invariants.assert_areas_of_boundary(made)
-    if not options.tolerance and options.periodic == "none" and len(set(options.pixel_sides)) == 1:
+    is_free = options.tolerance == 0.0 and options.join is None and options.max_shift == MeshOptions().max_shift
+    if is_free and options.periodic == "none" and len(set(options.pixel_sides)) == 1:
         invariants.assert_areas_of_pixels(made)
     if options.periodic != "none":
         invariants.assert_opposite_sides_match(made.pixel_mesh, options.periodic, made.boundary.shape)
