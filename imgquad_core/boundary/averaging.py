@@ -52,7 +52,9 @@ _WIGGLE = 4.0  # widths of a chain that the bell may take together: a tip or a b
 _ROUNDS = 12  # of halving widths; afterwards whole chains keep their pixels
 
 
-def averaged(chains: PixelChains, width: float, units: Floats | float, *, threads: int = 1) -> PixelChains:
+def averaged(
+    chains: PixelChains, width: float, units: Floats | float, as_pixels: Flags | None = None, *, threads: int = 1
+) -> PixelChains:
     """Average chains over a width.
 
     Parameters
@@ -63,6 +65,8 @@ def averaged(chains: PixelChains, width: float, units: Floats | float, *, thread
         More than 1.
     units : float or float64, shape (2,)
         Steps of the grid on which coordinates are exact, a unit of length, of x and y, before.
+    as_pixels : bool, shape (n_chains,), optional
+        Chains that keep their pixels.
     threads : int
         How many share the points.
 
@@ -75,7 +79,10 @@ def averaged(chains: PixelChains, width: float, units: Floats | float, *, thread
     reach, wiggle = _REACH * width, _WIGGLE * width
     room = _ROOM * local_feature_size(curves.raw, curves, reach, _ARC_RATIO, wiggle=wiggle, threads=threads)
     thin = local_feature_size(curves.raw, curves, reach, _THIN, wiggle=wiggle, threads=threads)
-    scale = _graded(curves, np.minimum(_widest(chains.graph, curves, width), _OF_FREE * thin))
+    widest = np.minimum(_widest(chains.graph, curves, width), _OF_FREE * thin)
+    if as_pixels is not None:
+        widest[per_point(curves, as_pixels)] = 0.0
+    scale = _graded(curves, widest)
     new = np.ones(len(curves.ends), bool)
     for attempt in range(_ROUNDS + 2):
         at, offsets = _places(curves, scale)

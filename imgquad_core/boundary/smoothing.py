@@ -32,7 +32,7 @@ from .pores import pores_of
 from .seams import Real, lay_seams, moved_areas, without_seams
 from .sharp_corners import beside_corners, find_corners, place_corners
 from .stairs import Step, as_step, find_step, in_data_points
-from .withdrawal import Draft, place_freely, restore_areas_freely
+from .withdrawal import CrossedError, Draft, place_freely, restore_areas_freely
 
 _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign points that both move it cannot meet
 _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for areas
@@ -79,15 +79,19 @@ def smooth_chains(
     shape: tuple[int, int] | None = None,
     barred: Flags | None = None,
     seams: Flags | None = None,
+    as_pixels: Flags | None = None,
 ) -> Smoothed:
-    """Do what `smooth_boundaries` does; `barred` chains are not joined, however short, `seams` move no others."""
+    """Do what `smooth_boundaries` does; `barred` chains are not joined, however short, `seams` move no others.
+
+    Joined chains that are flagged `as_pixels` are not averaged, whatever the tolerance.
+    """
     step = find_step(graph) if options.step == "auto" else as_step(options.step)
     true, threads = _TrueShape.of(graph.shape, shape, step), threads_of(options.threads)
     pores = pores_of(graph)
     chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step, barred)
     width = 0.5 * options.tolerance / true.unit
     if width > 1.0:
-        chains = averaged(chains, width, UNITS * np.array(step), threads=threads)
+        chains = averaged(chains, width, UNITS * np.array(step), as_pixels, threads=threads)
         true = _TrueShape.of(graph.shape, shape, (step[0] * width, step[1] * width))
     curves, ends = curves_of(*chains)
     curves, is_corner = find_corners(curves, threads=threads)
@@ -106,7 +110,13 @@ def smooth_chains(
         curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.edge_multiple, true.extent,
         true.grid, is_seam, real.ends,
     )  # fmt: skip
-    nodes, gently = place_freely(draft, _wanted_sizes(draft, real, options.growth, threads))
+    try:
+        nodes, gently = place_freely(draft, _wanted_sizes(draft, real, options.growth, threads))
+    except CrossedError as crossed:  # every second point of averaged chains may cross where the chains do not
+        before = np.zeros(len(which), bool) if as_pixels is None else as_pixels
+        if width <= 1.0 or before[crossed.chains].all():
+            raise
+        return smooth_chains(graph, options, shape, barred, seams, before | crossed.chains)
     areas = np.append(graph.region_pixels, pores.pixels) * true.pixel
     sides = pores.sides[which]
     areas = areas / true.unit**2 + moved_areas(smooth, curves, is_seam, sides, len(areas))

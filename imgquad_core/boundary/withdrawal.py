@@ -41,6 +41,14 @@ _AREA_ROUNDS = (
 _KINK = 0.3  # px of shift for areas that may come or go in a px of arc: a turn of at most 17 degrees
 
 
+class CrossedError(TopologyError):
+    """Chains cross or touch, even where they are."""
+
+    def __init__(self, chains: Flags) -> None:
+        super().__init__("chains of the pixel boundary itself cross or touch")
+        self.chains = chains  #: (n_chains,)
+
+
 class Patience(NamedTuple):
     """After how many rounds what is given up: handed down, so that a test can ask for less."""
 
@@ -101,6 +109,11 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         Nodes whose fine and coarse polylines neither cross nor touch.
     bool
         They also keep room, and sectors of 35 degrees.
+
+    Raises
+    ------
+    CrossedError
+        If chains cross or touch where they were before smoothing: those of pixels do not.
     """
     curves = draft.curves
     at_least = _least_segments(curves.ends)
@@ -123,7 +136,7 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         failed |= any_of_chain(shorter < size, curves.offsets)
         size, withdrawn = shorter, np.where(per_point(curves, exact), 1.0, np.minimum(withdrawn + pull, 1.0))
         is_new = _with_neighbours(curves.ends, failed | exact, len(draft.node))
-    raise TopologyError("chains of the pixel boundary itself cross or touch")
+    raise CrossedError(failed)
 
 
 def _least_segments(ends: Ints) -> Ints:

@@ -18,7 +18,7 @@ from imgquad_core.options import MeshOptions
 from imgquad_core.picture.selection import crop_image, drop_materials, material_number
 from imgquad_core.pipeline import STAGES, mesh_image, run
 from imgquad_core.remedies import thin_features
-from support.invariants import assert_valid_mesh
+from support.invariants import assert_accounted, assert_simplified_mesh, assert_valid_mesh
 from support.labels import KINDS, Labels, label_image, labels_of_kind, voronoi, wedge
 
 pictures = st.builds(
@@ -58,6 +58,13 @@ def test_void_is_left_out(labels: Labels, void: int) -> None:
             mesh_image(image)
         return
     assert_valid_mesh(mesh_image(image, MeshOptions(size=2.5)), image)
+
+
+def test_averaged_chains_that_cross_at_every_second_point_keep_their_pixels() -> None:
+    image = label_image(labels_of_kind("void", 20, 29, 7, 840808759))
+    done = run(image, MeshOptions(size=6.0, effort="fast", policy="majority", tolerance=6.0, keep=(4,)))
+    assert_simplified_mesh(done.mesh, done.labels)
+    assert_accounted(done)
 
 
 @pytest.mark.parametrize("effort", ["fast", "normal", "best"])
