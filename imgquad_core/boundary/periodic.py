@@ -158,13 +158,16 @@ def _areas(graph: BoundaryGraph) -> Floats:
 
 
 def _with_areas(graph: BoundaryGraph, areas: Floats) -> BoundaryGraph:
-    """Give the regions back what moving the ends of boundaries took; less where chains would cross."""
+    """Give the regions back what moving the ends of boundaries took; less where chains would cross or leave."""
     is_free = graph.point_kind[graph.chain_points] == PointKind.FREE
+    extent = np.array(graph.shape[::-1], float)
+    farthest = np.maximum(extent, snapped(extent))
     for share in (1.0, 0.5, 0.25):
         bound = np.where(is_free, share * AREA_ROOM, 0.0)
         points, _ = restore_areas(graph.points, graph.chains, areas, bound, np.zeros(graph.n_chains))
         moved = replace(graph, points=snapped(points))
-        if not _crossing(moved, 1) and not _crossing(moved, 2):
+        is_within = (moved.points >= 0.0).all() and (moved.points <= farthest).all()  # beyond is void: nothing to cross
+        if is_within and not _crossing(moved, 1) and not _crossing(moved, 2):
             return moved
     return graph
 

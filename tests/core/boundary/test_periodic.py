@@ -24,7 +24,7 @@ from imgquad_core.writers import write_mesh
 from support import naive
 from support.ccx import needs_ccx, solve
 from support.handmade import staircase
-from support.labels import label_image
+from support.labels import label_image, labels_of_kind
 
 
 def wrapped_disks(seed: int, n: int = 96, count: int = 12) -> NDArray[np.int32]:
@@ -117,6 +117,14 @@ def test_sides_of_which_a_material_was_dropped_match_where_both_are_meshed() -> 
     assert ((a[:, 1] <= 10) | (a[:, 1] >= 35)).all()
     labels[:, [0, -1]] = 1  # nothing is left on both sides
     assert mesh_image(labels, MeshOptions(size=4.0, periodic="xy", drop=("1",))).n_quads > 0
+
+
+def test_no_boundary_of_void_leaves_the_picture() -> None:
+    labels = labels_of_kind("void", 8, 14, 7, 1040089455)[::-1]
+    options = MeshOptions(size=2.5, policy="junction", periodic="x", drop=(2,), join=12.0, min_pixels=3, min_length=5.0)
+    points = run(label_image(np.ascontiguousarray(labels)), options).mesh.points
+    assert (points >= 0.0).all()
+    assert (points <= [14.0, 8.0]).all()
 
 
 def test_order_two_and_extrusion_carry_the_pairs() -> None:
