@@ -14,20 +14,18 @@ from imgquad_core.boundary.smoothing import SmoothingOptions, smooth_boundaries
 from imgquad_core.cleanup.faces import faces_only
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.errors import InputError, TopologyError
-from imgquad_core.geometry.conflicts import CROSSING, find_conflicts
 from imgquad_core.measures.quality import quality_report
 from imgquad_core.mesher import meshing, refits, strides
 from imgquad_core.mesher.efforts import EFFORTS, Tuning
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.mesher.options import MeshingOptions
-from imgquad_core.mesher.outline import coarse_segments
 from imgquad_core.model import VOID, BoundaryGraph, LabelImage, PointKind, QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.pipeline import run
 from support import naive
 from support.faces import Points, graph_of, polygon_graph, voronoi_graph
 from support.invariants import assert_valid_mesh
-from support.labels import Labels, disc, label_image, labels_of_kind, voronoi
+from support.labels import Labels, disc, label_image, voronoi
 
 ARRAYS = ("points", "point_kind", "quads", "quad_region", "chain_offsets", "chain_points", "chain_regions")
 
@@ -310,30 +308,6 @@ def test_no_point_is_placed_on_the_border() -> None:
     image = label_image(labels)
     options = MeshOptions(size=6.0, material_sizes={0: 2.0}, frame_size=0.8, boundary_size=3.0, max_shift=0.0)
     assert_valid_mesh(run(image, replace(options, policy="majority")).mesh, image)
-
-
-def test_no_node_slides_over_void_out_of_the_picture() -> None:
-    labels = labels_of_kind("void", 38, 16, 2, 565211775)
-    made = run(label_image(labels), MeshOptions(size=1.0, tolerance=6.0, periodic="y", pixel_size=(3.0, 1.0)))
-    assert (made.mesh.points >= 0.0).all()
-    assert (made.mesh.points <= [48.0, 38.0]).all()
-
-
-def test_nodes_that_would_meet_others_over_void_do_not_slide(monkeypatch: pytest.MonkeyPatch) -> None:
-    labels = np.zeros((30, 30), np.int32)
-    labels[8:14, 5:25] = labels[16:22, 5:25] = VOID  # two slots, 2 px apart
-    graph = boundaries(label_image(labels), 2.0)
-
-    def jump(points: Points, _: object, kind: Points, *__: object) -> None:
-        """Throw the nodes that may slide over the void."""
-        points[kind == PointKind.FREE, 1] += 7.0
-
-    monkeypatch.setattr(meshing, "slide", jump)
-    mesh = mesh_boundaries(graph, MeshingOptions(2.0))
-    segments = coarse_segments(mesh, np.ones(len(mesh.chain_regions), bool), 1)
-    pairs = np.stack([segments.tail, segments.head], axis=1)
-    marks = find_conflicts(mesh.points, pairs, segments.chain, np.ones(len(mesh.chain_regions), bool), (30, 30))
-    assert (marks < CROSSING).all()
 
 
 def test_parts_that_do_not_touch() -> None:
