@@ -19,9 +19,9 @@ from imgquad_core.arrays import Flags, Floats, Ints, Labels, read_only
 from imgquad_core.chains import any_of_chain, edges_of_chains, without_unused_points
 from imgquad_core.cleanup.faces import FaceQuads, joined, stitched
 from imgquad_core.cleanup.options import Portions
-from imgquad_core.cleanup.relaxation import GOOD, GUARD, newton, part, rings_of, untangle
+from imgquad_core.cleanup.relaxation import GOOD, GUARD, Rings, newton, part, rings_of, untangle
 from imgquad_core.cleanup.sliding import slide
-from imgquad_core.cleanup.strips import independent_nodes, strips_of
+from imgquad_core.cleanup.strips import independent_nodes, nodes_around, strips_of
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.conflicts import CROSSING, find_conflicts
 from imgquad_core.geometry.quad_shape import lower_to_worst
@@ -36,7 +36,8 @@ from .refits import State, with_musts, with_wishes
 from .strides import LEAST_WIDTH, WIDEST, consistent, mesh_faces
 
 STUB = 0.1  # of the longest edge at a node: a shorter one is lengthened in the end
-LEAST = 0.5  # scaled Jacobian that is left by it, or the worst of the mesh where that is better
+SLIVER = 0.02  # of the longest edge at a node: a shorter one makes a triangle of its quads, which no angle tells
+LEAST = 0.5  # scaled Jacobian that is left by it, or the worst of the mesh where that is better, but for slivers
 FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60 degrees give .866
 
 
@@ -145,7 +146,17 @@ def _slid_but(mesh: QuadMesh, held: Flags, rounds: int, threads: int, portions: 
     move(lambda free: untangle(points, rings, free, 4, FAIR))
     floor = _worst(points, rings.quads)
     move(lambda free: part(points, rings, free, STUB, floor))
+    if (mended := _parted(points, rings, move)).any():
+        near = nodes_around(rings.quads, mended, 1)
+        move(lambda free: untangle(points, rings, free & near, 4, FAIR))
     return replace(mesh, points=points)
+
+
+def _parted(points: Floats, rings: Rings, move: Callable[[Callable[[Flags], object]], None]) -> Flags:
+    """Lengthen the slivers that are left, at the cost of angles; flag the nodes that were moved."""
+    before = points.copy()
+    move(lambda free: part(points, rings, free, SLIVER, LEAST))
+    return np.asarray((points != before).any(axis=1))
 
 
 def _met_over_void(mesh: QuadMesh, shape: tuple[int, int]) -> Flags:
