@@ -31,7 +31,7 @@ def strips_of(points: Floats, quads: Ints, portions: Portions = PORTIONS, *, shi
     extent = np.ptp(points, axis=0)
     along = int(extent[1] > extent[0])
     place = (points[quads[:, 0], along] - points[:, along].min()) / extent[along]
-    count = max(2, round(np.sqrt(len(quads) * extent[along] / extent[1 - along]) / portions.strip))
+    count = 2 * max(1, round(np.sqrt(len(quads) * extent[along] / extent[1 - along]) / portions.strip / 2))
     return np.asarray(np.minimum(count * place, count - 1e-9) + 0.5 * shifted, np.int64)
 
 
