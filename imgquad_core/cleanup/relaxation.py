@@ -22,6 +22,8 @@ GUARD = 0.6  # a move may lower a ring's worst scaled Jacobian down to this, not
 TOLERANCE = 0.015  # of the edge length: smaller moves stop the activity of a node
 GOOD = 0.9  # Newton works on rings with a quad below this
 BAD = 0.35  # the pattern search works on rings below this
+SLIVER = 0.02  # of the longest edge at a node: a shorter one makes a triangle of its quads, which no angle tells
+LEAST = 0.5  # scaled Jacobian down to which angles may pay for that
 SHORT = 0.25  # of the longest edge at a node: the pattern search makes no edge there shorter, for angles alone
 POWER = 4  # of the inverse mean ratio in Newton's energy
 HALVINGS = 6  # of a Newton step that makes things worse, until the node stays: 1/64 of the step is not worth it
@@ -393,24 +395,37 @@ def _approach(points: Floats, rings: Rings, late: Flags, targets: Floats) -> Fla
 
 
 @kernel
-def part(points: Floats, rings: Rings, free: Flags, share: float, floor: float) -> None:
+def part(points: Floats, rings: Rings, free: Flags, share: float, floor: float, mended: Flags) -> None:
     """Move free nodes away from a neighbour that is nearer than `share` of their longest edge, in place.
 
-    Angles do not see how short a side is. No quad gets a scaled Jacobian below `floor` by it.
+    Angles do not see how short a side is. No quad gets a scaled Jacobian below `floor` by it. Where that leaves a
+    sliver it may come down to `LEAST`, until it is none; such nodes are flagged in `mended`.
     """
     for v in range(len(points)):
         if not free[v] or rings.offsets[v] == rings.offsets[v + 1]:
             continue
         shortest, longest = _reach_of(points, rings, v)
-        step, x, y = SHORT * longest, points[v, 0], points[v, 1]
-        while shortest < share * longest and step > TOLERANCE * longest:
-            need, best_x, best_y = min(guarded(points, rings, v), floor), x, y
-            for d in range(len(WAYS)):
-                points[v, 0], points[v, 1] = x + step * WAYS[d, 0], y + step * WAYS[d, 1]
-                reach, _ = _reach_of(points, rings, v)
-                if reach > shortest and is_sound(points, rings, v, need):
-                    shortest, best_x, best_y = reach, points[v, 0], points[v, 1]
-            points[v, 0], points[v, 1] = best_x, best_y
-            if best_x == x and best_y == y:
-                step *= 0.5
-            x, y = best_x, best_y
+        if shortest < share * longest:
+            shortest, longest = _part(points, rings, v, share, floor)
+            if shortest < SLIVER * longest:
+                _part(points, rings, v, SLIVER, LEAST)
+                mended[v] = True
+
+
+@verb
+def _part(points: Floats, rings: Rings, v: int, share: float, floor: float) -> tuple[float, float]:
+    """Move node v until its shortest edge is `share` of its longest one, as far as may be; return their lengths."""
+    shortest, longest = _reach_of(points, rings, v)
+    step, x, y = SHORT * longest, points[v, 0], points[v, 1]
+    while shortest < share * longest and step > TOLERANCE * longest:
+        need, best_x, best_y = min(guarded(points, rings, v), floor), x, y
+        for d in range(len(WAYS)):
+            points[v, 0], points[v, 1] = x + step * WAYS[d, 0], y + step * WAYS[d, 1]
+            reach, _ = _reach_of(points, rings, v)
+            if reach > shortest and is_sound(points, rings, v, need):
+                shortest, best_x, best_y = reach, points[v, 0], points[v, 1]
+        points[v, 0], points[v, 1] = best_x, best_y
+        if best_x == x and best_y == y:
+            step *= 0.5
+        x, y = best_x, best_y
+    return shortest, longest

@@ -19,7 +19,7 @@ from imgquad_core.arrays import Flags, Floats, Ints, Labels, read_only
 from imgquad_core.chains import any_of_chain, edges_of_chains, without_unused_points
 from imgquad_core.cleanup.faces import FaceQuads, joined, stitched
 from imgquad_core.cleanup.options import Portions
-from imgquad_core.cleanup.relaxation import GOOD, GUARD, Rings, newton, part, rings_of, untangle
+from imgquad_core.cleanup.relaxation import GOOD, GUARD, LEAST, newton, part, rings_of, untangle
 from imgquad_core.cleanup.sliding import slide
 from imgquad_core.cleanup.strips import independent_nodes, nodes_around, strips_of
 from imgquad_core.errors import TopologyError
@@ -35,9 +35,7 @@ from .progress import Progress
 from .refits import State, with_musts, with_wishes
 from .strides import LEAST_WIDTH, WIDEST, consistent, mesh_faces
 
-STUB = 0.1  # of the longest edge at a node: a shorter one is lengthened in the end
-SLIVER = 0.02  # of the longest edge at a node: a shorter one makes a triangle of its quads, which no angle tells
-LEAST = 0.5  # scaled Jacobian that is left by it, or the worst of the mesh where that is better, but for slivers
+STUB = 0.1  # of the longest edge at a node: a shorter one is lengthened in the end, as far as the worst quad allows
 FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60 degrees give .866
 
 
@@ -125,7 +123,9 @@ def _slid(mesh: QuadMesh, shape: tuple[int, int], rounds: int, threads: int, por
     held = np.zeros(mesh.n_points, bool)
     while True:
         moved = _slid_but(mesh, held, rounds, threads, portions)
-        met = _met_over_void(moved, shape) & ~held & (moved.points != mesh.points).any(axis=1)
+        met = _met_over_void(moved, shape) & ~held
+        if met.any():
+            met &= (moved.points != mesh.points).any(axis=1)
         if not met.any():
             return moved
         held |= met
@@ -144,19 +144,12 @@ def _slid_but(mesh: QuadMesh, held: Flags, rounds: int, threads: int, portions: 
         slide(points, rings, kind, mesh.chain_offsets, mesh.chain_points, gone)
         move(lambda free: newton(points, rings, free, 2, GOOD))
     move(lambda free: untangle(points, rings, free, 4, FAIR))
-    floor = _worst(points, rings.quads)
-    move(lambda free: part(points, rings, free, STUB, floor))
-    if (mended := _parted(points, rings, move)).any():
+    floor, mended = _worst(points, rings.quads), np.zeros(mesh.n_points, bool)
+    move(lambda free: part(points, rings, free, STUB, floor, mended))
+    if mended.any():
         near = nodes_around(rings.quads, mended, 1)
         move(lambda free: untangle(points, rings, free & near, 4, FAIR))
     return replace(mesh, points=points)
-
-
-def _parted(points: Floats, rings: Rings, move: Callable[[Callable[[Flags], object]], None]) -> Flags:
-    """Lengthen the slivers that are left, at the cost of angles; flag the nodes that were moved."""
-    before = points.copy()
-    move(lambda free: part(points, rings, free, SLIVER, LEAST))
-    return np.asarray((points != before).any(axis=1))
 
 
 def _met_over_void(mesh: QuadMesh, shape: tuple[int, int]) -> Flags:

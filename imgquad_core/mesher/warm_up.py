@@ -35,7 +35,7 @@ def compile_last_stages() -> None:
     fit_rim(points, rings, none, points, 1)
     laplace(points, rings, none, 1)
     untangle(points, rings, none, 1, BAD)
-    part(points, rings, none, 0.1, 0.5)
+    part(points, rings, none, 0.1, 0.5, none)
     rim_angles(points, mesh.quads, none)
     lower_to_worst(points, mesh.quads, mesh.face, np.ones(1))
 

@@ -116,12 +116,14 @@ def test_a_node_that_all_but_touches_another_is_parted_from_it(floor: float) -> 
     points = np.append(np.stack([np.cos(angle), np.sin(angle)], axis=1), [[0.99, 0.0]], axis=0)
     quads, free = np.array([[6, 0, 1, 2], [6, 2, 3, 4], [6, 4, 5, 0]]), np.arange(7) == 6
     before = naive.worst_quality(points, quads)
-    part(points, rings_of(quads, 7), free, 0.1, floor)
+    mended = np.zeros(7, bool)
+    part(points, rings_of(quads, 7), free, 0.1, floor, mended)
+    assert not mended.any()
     lengths = np.hypot(*(points[6] - points[[0, 2, 4]]).T)
     assert lengths.min() >= 0.1 * lengths.max()
     assert naive.worst_quality(points, quads) >= min(before, floor)
     rested = points.copy()
-    part(points, rings_of(quads, 7), free, 0.1, floor)
+    part(points, rings_of(quads, 7), free, 0.1, floor, mended)
     assert np.array_equal(points, rested), "long enough"
 
 
