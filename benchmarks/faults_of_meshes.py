@@ -127,8 +127,7 @@ def meshed_however(labels: np.ndarray, drawn: dict[str, object], rng: Generator)
     assert np.array_equal(pickle.loads(pickle.dumps(made)).mesh.points, made.mesh.points)
     turn = TURNS[int(rng.integers(1, len(TURNS)))]
     turned = judged(turn.picture(labels), MeshOptions(**turned_options(drawn, turn), threads=1))  # type: ignore[arg-type]
-    same = np.array_equal(turned.labels.labels, turn.picture(made.labels.labels))  # noise removal had no tie
-    if same and not hangs_on_position(labels, options):
+    if not hangs_on_position(labels, options):
         assert turned.mesh.n_quads == made.mesh.n_quads, f"{made.mesh.n_quads} quads, turned {turned.mesh.n_quads}"
 
 

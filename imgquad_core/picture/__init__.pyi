@@ -3,7 +3,7 @@ from .editing import area_shares, edit_materials, merge_materials, recolor_mater
 from .legend import Legend, counts_labels, label_by, legend_of, sample_of, tally_labels
 from .marks import Marks, marks_of
 from .naming import as_told
-from .noise import Removal, automatic_limits, list_removed, remove_noise
+from .noise import Removal, automatic_limits, list_removed, remove_in_order, remove_noise
 from .options import AbsorbOptions, DenoiseOptions, EditOptions, SegmentationOptions
 from .segmentation import Segmentation, segment_picture
 from .selection import (
@@ -48,6 +48,7 @@ __all__ = [
     "material_number",
     "merge_materials",
     "recolor_materials",
+    "remove_in_order",
     "remove_noise",
     "rename_materials",
     "sample_of",

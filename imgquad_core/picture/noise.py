@@ -17,6 +17,7 @@ from imgquad_core.geometry.corner_rule import PAIR_AD, PAIR_BC, corner_rule, joi
 from imgquad_core.grouping import root_of
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, LabelImage
+from imgquad_core.orientation import turn_of_image
 
 from .clusters import Clusters, join, labelled_clusters
 from .options import DenoiseOptions
@@ -92,7 +93,8 @@ def remove_noise(image: LabelImage, options: DenoiseOptions | None = None) -> La
 
     A cluster goes to the material with the longest common border (pixel sides; all neighbours of one material
     count together, for they become one cluster with it). Ties: the material with the largest neighbouring cluster,
-    then the lower number. Among clusters of the same number of pixels the first in reading order goes first.
+    then the lower number. Among clusters of the same number of pixels the first in reading order goes first, in
+    the one of the picture's positions that `imgquad_core.orientation` picks: a turned picture loses the same.
     Merged clusters are measured anew, and labelled anew until nothing changes. `VOID` is neither noise nor a
     neighbour, and a cluster without a neighbour stays. Time is linear in the number of pixels for given limits.
 
@@ -101,6 +103,12 @@ def remove_noise(image: LabelImage, options: DenoiseOptions | None = None) -> La
     The paper's step 1 (doi:10.1063/2.1106101).
     """
     options = options or DenoiseOptions()
+    turn = turn_of_image(image, options.policy)
+    return turn.image_back(remove_in_order(turn.image(image), options)) if options.removes else image
+
+
+def remove_in_order(image: LabelImage, options: DenoiseOptions) -> LabelImage:
+    """Do what `remove_noise` does in the picture as it lies: windows of a large one then lose the same."""
     if not options.removes or image.labels.size == 0:
         return image
     values, colors = _ranked(image)

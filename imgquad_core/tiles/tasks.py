@@ -41,7 +41,7 @@ from imgquad_core.picture import (
     drop_materials,
     label_by,
     legend_of,
-    remove_noise,
+    remove_in_order,
     sample_of,
     tally_labels,
 )
@@ -138,7 +138,7 @@ def labels(job: Job, t: int, *_: Any) -> None:
     window = job.grid.box(t, NOISE_REACH + int(noise.min_length) if noise.removes else 4)
     how = rules.options.segmentation()
     raw = label_by(job.source.read(window), rules.legend, how, may_be_void=True).image
-    clean = drop_materials(remove_noise(raw, noise), rules.options.drop).labels
+    clean = drop_materials(remove_in_order(raw, noise), rules.options.drop).labels
     before, after = _inside(raw.labels, window, box), _inside(clean, window, box)
     numbers = rules.legend.materials.labels
     save_plane(path, np.ascontiguousarray(after))

@@ -72,6 +72,12 @@ def test_so_it_is_with_options(turn: Turn, options: MeshOptions) -> None:
     assert_alike(labels_of_kind("cells", 40, 52, 4, 5), turn, options)
 
 
+@pytest.mark.parametrize("turn", TURNS[1:])
+@pytest.mark.parametrize("seed", range(3))
+def test_so_it_is_where_clusters_of_noise_are_of_one_size(turn: Turn, seed: int) -> None:
+    assert_alike(labels_of_kind("noise", 15, 21, 3, seed), turn, MeshOptions(size=2.5, min_pixels=6, min_length=5.0))
+
+
 def test_the_diagonal_policy_is_of_the_picture_as_it_lies() -> None:
     labels = np.array([[0, 1], [1, 0]], np.int32)
     diagonal = ExtractionOptions(policy="diagonal")
