@@ -16,9 +16,10 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Ints, Labels
+from .arrays import Floats, Ints
 from .model import BoundaryGraph, LabelImage, QuadMesh
 
+P = TypeVar("P", bound=np.generic)
 T = TypeVar("T", BoundaryGraph, QuadMesh)
 _FINE = 1024  #: parts of a pixel in which points are told apart: fewer than those in which they lie
 _MIX = tuple(np.uint64(odd) for odd in (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9))
@@ -42,9 +43,9 @@ class Turn(NamedTuple):
         """Whether counter-clockwise becomes clockwise."""
         return bool((self.transposed + self.upside_down + self.mirrored) % 2)
 
-    def picture(self, labels: Labels) -> Labels:
-        """Return labels, shape (n_rows, n_cols), in this position."""
-        seen = labels.T if self.transposed else labels
+    def picture(self, pixels: NDArray[P]) -> NDArray[P]:
+        """Return pixels, shape (n_rows, n_cols) or (n_rows, n_cols, n_channels), in this position."""
+        seen = pixels.swapaxes(0, 1) if self.transposed else pixels
         return seen[:: -1 if self.upside_down else 1, :: -1 if self.mirrored else 1]
 
     def image(self, image: LabelImage) -> LabelImage:
@@ -106,10 +107,10 @@ def turn_of_image(image: LabelImage, policy: str) -> Turn:
     return Turn() if policy == "diagonal" else turn_of_picture(image.labels)
 
 
-def turn_of_picture(labels: Labels) -> Turn:
+def turn_of_picture(pixels: NDArray[P]) -> Turn:
     """Return the position in which the picture comes first, read row by row; the lying one of an oblong picture."""
-    n_rows, n_cols = labels.shape
-    left = {turn: turn.picture(labels) for turn in TURNS if turn.transposed == (n_rows > n_cols) or n_rows == n_cols}
+    n_rows, n_cols = pixels.shape[:2]
+    left = {turn: turn.picture(pixels) for turn in TURNS if turn.transposed == (n_rows > n_cols) or n_rows == n_cols}
     for row in range(min(n_rows, n_cols)):
         rows = {turn: picture[row].tobytes() for turn, picture in left.items()}
         first = min(rows.values())

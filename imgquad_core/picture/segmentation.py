@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from imgquad_core.arrays import Flags, Floats
 from imgquad_core.errors import InputError
 from imgquad_core.model import VOID, LabelImage, Materials
+from imgquad_core.orientation import turn_of_picture
 from imgquad_core.reading.picture import Picture, either, picture_of, where_equal
 
 from .classes import APART
@@ -18,7 +19,7 @@ from .exact_colours import ANY_NUMBER, exact_labels, with_minus_one
 from .grain_maps import LEFT_OVER, SHARE, cores_of, regions_of
 from .kinds import Kind, kind_of
 from .levels import NOISY, levels_of
-from .marks import grow_from, marks_of
+from .marks import Marks, grow_from, marks_of
 from .options import SegmentationOptions
 from .raw import Found, find_classes, find_nearest
 from .voids import fill_void, void_clusters
@@ -119,14 +120,20 @@ def segment_picture(
         return Segmentation(picture, quantised=False)
     picture = picture if isinstance(picture, Picture) else picture_of(picture)
     void = void_of(picture, options)
-    return void_told(_found(picture, options, void), options)
+    marks = None if options.marks is None else marks_of(options.marks, picture.shape)
+    turn = turn_of_picture(picture.values)  # filters are not alike in all directions
+    picture = replace(picture, values=np.ascontiguousarray(turn.picture(picture.values)))
+    void = None if void is None else np.ascontiguousarray(turn.picture(void))
+    marks = None if marks is None else replace(marks, labels=np.ascontiguousarray(turn.picture(marks.labels)))
+    found = void_told(_found(picture, options, void, marks), options)
+    return replace(found, image=turn.image_back(found.image))
 
 
-def _found(picture: Picture, options: SegmentationOptions, void: Flags | None) -> Segmentation:
+def _found(picture: Picture, options: SegmentationOptions, void: Flags | None, marks: Marks | None) -> Segmentation:
     """Find the materials by the way that the options or the picture ask for."""
     colors = options.colors
-    if options.marks is not None:
-        return _grown(picture, options, void)
+    if marks is not None:
+        return _grown(picture, options, void, marks)
     if picture.labels and colors not in ("auto", "exact"):
         raise InputError(f"colors is {colors}, but {picture.name} holds labels: give auto or exact")
     if colors == "auto":
@@ -154,9 +161,8 @@ def void_of(picture: Picture, options: SegmentationOptions) -> Flags | None:
     return void
 
 
-def _grown(picture: Picture, options: SegmentationOptions, void: Flags | None) -> Segmentation:
+def _grown(picture: Picture, options: SegmentationOptions, void: Flags | None, marks: Marks) -> Segmentation:
     """Let materials grow from marks."""
-    marks = marks_of(options.marks, picture.shape)
     share = np.mean(marks.labels != VOID)
     details = f", from {share:.2%} of the pixels" + (", and from what looks like them" if options.learn else "")
     return Segmentation(

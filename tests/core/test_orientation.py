@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from imgquad_core import MeshOptions
 from imgquad_core.boundary import ExtractionOptions
 from imgquad_core.orientation import TURNS, Turn, turn_of_picture
+from imgquad_core.picture.segmentation import SegmentationOptions, segment
 from imgquad_core.pipeline import extract, run
 from support.labels import KINDS, label_image, labels_of_kind
 
@@ -76,6 +77,21 @@ def test_so_it_is_with_options(turn: Turn, options: MeshOptions) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_so_it_is_where_clusters_of_noise_are_of_one_size(turn: Turn, seed: int) -> None:
     assert_alike(labels_of_kind("noise", 15, 21, 3, seed), turn, MeshOptions(size=2.5, min_pixels=6, min_length=5.0))
+
+
+@pytest.mark.parametrize("turn", TURNS[1:])
+def test_so_it_is_with_raw_pictures_and_marks(turn: Turn) -> None:
+    noise = np.random.default_rng(2).normal(0, 30, (48, 60))
+    grey = np.clip(labels_of_kind("cells", 48, 60, 2, 5) * 90 + 80 + noise, 0, 255).astype(np.uint8)
+    colour = np.stack([grey, grey[::-1], grey], axis=2)
+    marks = np.where(np.arange(60) < 20, 1, np.where(np.arange(60) > 50, 2, 0)) * np.ones((48, 1), int)
+    for values, marked in ((grey, None), (colour, None), (grey, marks)):
+        plain = segment(values, SegmentationOptions(marks=marked))
+        turned = segment(
+            turn.picture(values), SegmentationOptions(marks=None if marked is None else turn.picture(marked))
+        )
+        assert np.array_equal(turn.picture(plain.labels), turned.labels)
+        assert len(np.unique(plain.labels)) > 1
 
 
 def test_the_diagonal_policy_is_of_the_picture_as_it_lies() -> None:
