@@ -85,7 +85,7 @@ def measure_cores(plane: Bytes, labels: Labels, sums: Ints, low: Bytes, high: By
 
 
 def regions_of(levels: Levels) -> LabelImage:
-    """Make each region of one colour a material, numbered in reading order.
+    """Make each region of one colour a material, numbered in reading order of the picture as it is given.
 
     Cores of even colour grow over the rest (watershed of the largest difference in 3 x 3 pixels).
 
