@@ -7,10 +7,9 @@ chain weighted by the length of it that can move. A few Newton steps, since area
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Floats, Ints
@@ -126,16 +125,37 @@ def _shifts(weight: Floats, sides: Ints, missing: Floats, target: NDArray[Any]) 
     n = len(missing)
     free = np.flatnonzero((weight > 1e-9) & (sides[:, 0] != sides[:, 1]))
     left, right = np.where(sides[free] < 0, n, sides[free]).T
-    adjacency = scipy.sparse.coo_matrix((weight[free], (left, right)), (n + 1, n + 1)).tocsr()
-    adjacency = (adjacency + adjacency.T)[:, :]
     wanted = _consistent(*linked(left, right, n + 1), np.append(missing, 0.0), np.append(target, 0.0))
-    inner = adjacency[:n, :n]
-    degree = np.asarray(adjacency.sum(axis=1)).ravel()[:n]
-    laplacian = scipy.sparse.diags(np.where(degree > 0, degree, 1.0)) - inner
-    potential = np.append(_conjugate_gradients(laplacian.tocsr(), wanted[:n]), 0.0)
+    links = _Links(weight[free], left, right, n)
+    potential = np.append(_conjugate_gradients(links, wanted[:n]), 0.0)
     shift = np.zeros(len(weight))
     shift[free] = potential[right] - potential[left]
     return shift
+
+
+class _Links(NamedTuple):
+    """The Laplacian of regions that are linked by their chains; the outside, the last one, stays at zero."""
+
+    weight: Floats  #: (n_links,)
+    left: Ints  #: (n_links,) region
+    right: Ints  #: (n_links,) another one
+    n: int  #: regions
+
+    @property
+    def diagonal(self) -> Floats:
+        """Sum of the weights of each region, 1 where it has no link."""
+        degree = self._sums(self.weight, self.weight)
+        return np.where(degree > 0.0, degree, 1.0)
+
+    def others(self, values: Floats) -> Floats:
+        """Return the Laplacian of values of the regions, but for what its diagonal gives."""
+        all_values = np.append(values, 0.0)
+        return -self._sums(self.weight * all_values[self.right], self.weight * all_values[self.left])
+
+    def _sums(self, on_left: Floats, on_right: Floats) -> Floats:
+        """Sum over the links of each region."""
+        sums = np.bincount(self.left, on_left, self.n + 1) + np.bincount(self.right, on_right, self.n + 1)
+        return np.asarray(sums[:-1], np.float64)
 
 
 def _consistent(group: Ints, n_groups: int, missing: Floats, target: Floats) -> Floats:
@@ -151,9 +171,9 @@ def _dot(a: Floats, b: Floats) -> float:
     return float(np.add.reduce(a * b))
 
 
-def _conjugate_gradients(matrix: Any, right: Floats) -> Floats:
-    """Solve for the symmetric positive (semi)definite matrix, preconditioned by its diagonal."""
-    diagonal = matrix.diagonal()
+def _conjugate_gradients(links: _Links, right: Floats) -> Floats:
+    """Solve for the Laplacian, which is symmetric and positive (semi)definite, preconditioned by its diagonal."""
+    diagonal = links.diagonal
     solution, residual = np.zeros_like(right), right.copy()
     scaled = residual / diagonal
     direction, rho = scaled.copy(), _dot(residual, scaled)
@@ -161,7 +181,7 @@ def _conjugate_gradients(matrix: Any, right: Floats) -> Floats:
     for _ in range(1000):
         if np.abs(residual).max(initial=0.0) <= goal:
             break
-        image = matrix @ direction
+        image = diagonal * direction + links.others(direction)
         curvature = _dot(direction, image)
         if not curvature > 1e-12 * _dot(direction, direction):
             break
