@@ -4,7 +4,8 @@ from .oblong_pixels import TrueShape, true_shape
 from .options import ExtractionOptions, SmoothingOptions
 from .periodic import DIRECTIONS, match_opposite_sides, rematch
 from .smoothing import Smoothed, smooth_boundaries, smooth_chains
-from .stairs import Step, as_step, find_step
+from .stairs import as_step, find_step
+from .zooms import Step
 
 __all__ = [
     "DIRECTIONS",

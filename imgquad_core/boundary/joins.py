@@ -215,14 +215,14 @@ def _join(net: Net, c: int, star: Ints, n: int, x: float, y: float, reach: float
 def _drawn(chains: PixelChains, net: Net, units: Floats | float) -> tuple[PixelChains, Ints]:
     """Draw what is left as dense points, with spokes; also return the old number of each chain."""
     which = np.flatnonzero(~net.gone)
-    drawn = [_drawn_chain(chains, net, c) for c in which.tolist()]
+    drawn = [_drawn_chain(chains, net, c, units) for c in which.tolist()]
     offsets = np.concatenate([[0], np.cumsum([len(side) for _, side in drawn])])
     raw, side = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     used, node = np.unique(net.node[which], return_inverse=True)
     used, node = used[used >= 0], node.reshape(-1, 2) - np.count_nonzero(used < 0)
     ids = numbered(offsets, node, len(used))
     points = np.empty((int(ids.max()) + 1, 2))
-    points[ids] = snapped(raw, units)
+    points[ids] = raw
     kind = np.full(len(points), PointKind.FREE, np.uint8)
     kind[ids[np.repeat(net.is_frame[which], np.diff(offsets))]] = PointKind.FRAME
     kind[: len(used)] = np.where(net.rank[used] == 2, PointKind.CORNER, PointKind.JUNCTION)
@@ -237,16 +237,18 @@ def _drawn(chains: PixelChains, net: Net, units: Floats | float) -> tuple[PixelC
     return PixelChains(graph, side), which
 
 
-def _drawn_chain(chains: PixelChains, net: Net, c: int) -> tuple[Floats, Ints]:
-    """Return the dense points of a chain, and what they are."""
+def _drawn_chain(chains: PixelChains, net: Net, c: int, units: Floats | float) -> tuple[Floats, Ints]:
+    """Return the dense points of a chain, and what they are; the new ones are on the grid."""
     first, last = net.offsets[c], net.offsets[c + 1]
     if net.node[c, 0] < 0 or (net.reach[net.node[c]] == 0.0).all():
         return net.raw[first:last], chains.side[first:last]
-    start, stop = net.place[net.node[c]]
+    places = net.place[net.node[c]]
+    start, stop = places
     begin, end = net.kept[c, 0], net.kept[c, 1] + 1
     inner, side = net.raw[begin:end], chains.side[begin:end]
-    before = _spoke(start, inner[0] if len(inner) else stop)
-    after = _spoke(inner[-1], stop) if len(inner) else inner
+    before = snapped(_spoke(start, inner[0] if len(inner) else stop), units)
+    after = snapped(_spoke(inner[-1], stop), units) if len(inner) else inner
+    start, stop = np.where((net.reach[net.node[c]] > 0.0)[:, None], snapped(places, units), places)
     raw = np.concatenate([start[None], before, inner, after, stop[None]])
     return raw, np.concatenate(
         [[PIXEL_CORNER], 0 * before[:, 0] + ELSEWHERE, side, 0 * after[:, 0] + ELSEWHERE, [PIXEL_CORNER]]

@@ -31,8 +31,9 @@ from .options import SmoothingOptions
 from .pores import pores_of
 from .seams import Real, lay_seams, moved_areas, without_seams
 from .sharp_corners import beside_corners, find_corners, place_corners
-from .stairs import Step, as_step, find_step, in_data_points
+from .stairs import as_step, find_step, in_data_points
 from .withdrawal import CrossedError, Draft, place_freely, restore_areas_freely
+from .zooms import Step, larger, unrounded
 
 _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign points that both move it cannot meet
 _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for areas
@@ -86,9 +87,13 @@ def smooth_chains(
     Joined chains that are flagged `as_pixels` are not averaged, whatever the tolerance.
     """
     step = find_step(graph) if options.step == "auto" else as_step(options.step)
+    pixels, pores = pixel_chains(graph), pores_of(graph)
+    exact, step = unrounded(pixels, step) if seams is None else (pixels, step)  # tiles would see different sides
     true, threads = _TrueShape.of(graph.shape, shape, step), threads_of(options.threads)
-    pores = pores_of(graph)
-    chains, which = _joined(in_data_points(pixel_chains(graph), step), options, true.unit, step, barred)
+    areas = np.append(graph.region_pixels, pores.pixels) * true.pixel
+    if exact is not pixels:
+        areas *= larger(pixels, exact, pores.sides, len(areas))
+    chains, which = _joined(in_data_points(exact, step), options, true.unit, step, barred)
     width = 0.5 * options.tolerance / true.unit
     if width > 1.0:
         chains = averaged(chains, width, UNITS * np.array(step), as_pixels, threads=threads)
@@ -117,13 +122,12 @@ def smooth_chains(
         if width <= 1.0 or before[crossed.chains].all():
             raise
         return smooth_chains(graph, options, shape, barred, seams, before | crossed.chains)
-    areas = np.append(graph.region_pixels, pores.pixels) * true.pixel
     sides = pores.sides[which]
-    areas = areas / true.unit**2 + moved_areas(smooth, curves, is_seam, sides, len(areas))
-    nodes = restore_areas_freely(sides, areas, draft, nodes, room, options.max_shift, gently)
+    wanted = areas / true.unit**2 + moved_areas(smooth, curves, is_seam, sides, len(areas))
+    nodes = restore_areas_freely(sides, wanted, draft, nodes, room, options.max_shift, gently)
     nodes = nodes._replace(points=snapped(nodes.points * true.unit))
-    pixels = np.maximum(np.rint(graph.region_pixels * true.pixel), 1).astype(np.int64)
-    return Smoothed(_graph(replace(chains.graph, shape=true.shape, region_pixels=pixels), draft, nodes), which)
+    region_pixels = np.maximum(np.rint(areas[: len(graph.region_pixels)]), 1).astype(np.int64)
+    return Smoothed(_graph(replace(chains.graph, shape=true.shape, region_pixels=region_pixels), draft, nodes), which)
 
 
 class _TrueShape(NamedTuple):

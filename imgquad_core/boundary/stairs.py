@@ -16,7 +16,7 @@ and columns are sqrt(3) to 1 apart.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -27,7 +27,9 @@ from imgquad_core.grouping import rows_of
 from imgquad_core.jit import kernel
 from imgquad_core.model import BoundaryGraph, PointKind
 
-from .curves import ACROSS, PIXEL_CORNER, PixelChains, numbered, on_frame, pixel_chains
+from .curves import PIXEL_CORNER, PixelChains, numbered, on_frame, pixel_chains
+from .runs import Runs, runs_of
+from .zooms import Step, fine_step
 
 _FEWEST_SIDES = 30  # across an axis, for a spectrum
 _LONGEST = 24.0  # px, of the periods that are looked for; the shortest is 2: places are whole numbers
@@ -40,20 +42,8 @@ _SHORT, _FEW_SHORT = 0.6, 0.02  # of the width; share of runs below it, at most
 _CLEAR, _OFF = 0.6, 1.0  # least height of the peak, and its distance in px from the mean step
 _HEX_LEAST, _HEX_OFF, _HEX_CLEAR = 2.0, 0.03, 0.2  # least distance of rows, px; off sqrt(3) at most; height there
 _HEX_RUNS = 60  # across an axis: the few of some rectangles have periods by chance
+_TINY = 1e-9  # data points
 _WHOLE = 0.004  # a period this near a whole number, relative, is that number
-
-#: width and height of data points, in pixels
-Step: TypeAlias = "tuple[float, float]"
-
-
-class _Runs(NamedTuple):
-    """Straight runs of sides, chain by chain."""
-
-    chain: Ints
-    begin: Floats  # (n, 2) corner where it begins
-    end: Floats  # (n, 2)
-    axis: Ints  # 0 horizontal, 1 vertical
-    length: Floats  # px
 
 
 class _Spectrum(NamedTuple):
@@ -90,7 +80,7 @@ def find_step(graph: BoundaryGraph) -> Step:
         Width and height in pixels, 1 where there is no sign of more.
     """
     chains = pixel_chains(graph)
-    runs = _runs_of(chains)
+    runs = runs_of(chains)
     is_inner = ~on_frame(graph)[runs.chain]
     spectra = [_spectrum(runs, axis, is_inner) for axis in (0, 1)]
     if hexagon := _hexagon(*spectra) or _hexagon(*spectra[::-1]):
@@ -99,7 +89,7 @@ def find_step(graph: BoundaryGraph) -> Step:
     is_stair, is_step = _stairs(runs, is_inner)
     found = [_width(runs.length, is_stair & (runs.axis == a), is_step & (runs.axis == a), peaks[a]) for a in (0, 1)]
     width, height = (found[a] or found[1 - a] or 1.0 for a in (0, 1))
-    return width, height
+    return fine_step(chains, (width, height))
 
 
 def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
@@ -121,11 +111,11 @@ def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
     if step == (1.0, 1.0):
         return chains
     graph, size = chains.graph, np.array(step)
-    runs = _runs_of(chains)
+    runs = runs_of(chains)
     number = np.maximum(np.floor(runs.length / size[runs.axis] + 0.5).astype(np.int64), 1)
     is_closed = graph.chain_points[graph.chain_offsets[:-1]] == graph.chain_points[graph.chain_offsets[1:] - 1]
     is_closed &= chains.side[graph.chain_offsets[:-1]] != PIXEL_CORNER
-    begin, end = runs.begin / size, runs.end / size
+    begin, end = _counted(runs.begin / size), _counted(runs.end / size)
     stays = _swallow(chains, runs, is_closed, runs.length / number)
     while True:  # chains with finer detail than a data point may cross where bends are cut: these keep their pixels
         sides = np.where(stays[runs.chain], np.rint(runs.length).astype(np.int64), number)
@@ -139,7 +129,13 @@ def in_data_points(chains: PixelChains, step: Step) -> PixelChains:
         stays[bad] = True
 
 
-def _swallow(chains: PixelChains, runs: _Runs, is_closed: Flags, side: Floats) -> Flags:
+def _counted(places: Floats) -> Floats:
+    """Make whole numbers of what is one but for rounding: a length that is a multiple of the size has no edge more."""
+    whole = np.rint(places)
+    return np.where(np.abs(places - whole) < _TINY, whole, places)
+
+
+def _swallow(chains: PixelChains, runs: Runs, is_closed: Flags, side: Floats) -> Flags:
     """Tell which chains would leave out points of others where their bends are cut, between the middles of sides."""
     found = np.zeros(chains.graph.n_chains, bool)
     before, after = _bends(runs.chain, is_closed)
@@ -166,7 +162,7 @@ def _bends(chain: Ints, is_closed: Flags) -> tuple[Ints, Ints]:
     return np.concatenate([same, last[round_]]), np.concatenate([same + 1, first[round_]])
 
 
-def _unit(runs: _Runs, at: Ints) -> Floats:
+def _unit(runs: Runs, at: Ints) -> Floats:
     return np.asarray((runs.end[at] - runs.begin[at]) / runs.length[at, None])
 
 
@@ -182,50 +178,8 @@ def _graph(graph: BoundaryGraph, raw: Floats, offsets: Ints, is_closed: Flags, s
     kind = np.full(len(points), PointKind.FREE, np.uint8)
     kind[ids[np.repeat(on_frame(graph), np.diff(offsets))]] = PointKind.FRAME
     kind[: len(used)] = graph.point_kind[used]
-    shape = tuple((np.array(graph.shape) / size[::-1]).tolist())
+    shape = tuple(_counted(np.array(graph.shape) / size[::-1]).tolist())
     return replace(graph, points=points, point_kind=kind, chain_offsets=offsets, chain_points=ids, shape=shape)
-
-
-def _runs_of(chains: PixelChains) -> _Runs:
-    """Find the straight runs of all chains: from an end or a bend to the next."""
-    graph = chains.graph
-    return _Runs(*_trace(graph.points[graph.chain_points], chains.side, np.array(graph.chain_offsets)))
-
-
-@kernel
-def _trace(points: Floats, side: Ints, offsets: Ints) -> tuple[Ints, Floats, Floats, Ints, Floats]:
-    chain, axis = np.empty(len(side), np.int64), np.empty(len(side), np.int64)
-    begin, end, length = np.empty((len(side), 2)), np.empty((len(side), 2)), np.empty(len(side))
-    n = 0
-    for c in range(len(offsets) - 1):
-        first, last = offsets[c], offsets[c + 1] - 1
-        is_open = side[first] == PIXEL_CORNER
-        x, y = points[first, 0], points[first, 1]
-        if not is_open:  # it begins beside a bend
-            x, y = _bend(points, side, last - 1, first)
-        for i in range(first + is_open, last):
-            is_last = i == last - 1
-            if side[i] == PIXEL_CORNER or (side[i + 1] == side[i] and not (is_last and not is_open)):
-                continue
-            if not is_last and side[i + 1] == PIXEL_CORNER:
-                continue
-            if is_last and is_open:
-                px, py = points[last, 0], points[last, 1]
-            else:
-                px, py = _bend(points, side, i, i + 1)
-            chain[n], axis[n], length[n] = c, side[i], abs(px - x) + abs(py - y)
-            begin[n, 0], begin[n, 1], end[n, 0], end[n, 1] = x, y, px, py
-            x, y = px, py
-            n += 1
-    return chain[:n].copy(), begin[:n].copy(), end[:n].copy(), axis[:n].copy(), length[:n].copy()
-
-
-@kernel
-def _bend(points: Floats, side: Ints, i: int, j: int) -> tuple[float, float]:
-    """Corner between two mid-sides, of which one lies across."""
-    if side[i] == ACROSS:
-        return points[j, 0], points[i, 1]
-    return points[i, 0], points[j, 1]
 
 
 @kernel
@@ -259,7 +213,7 @@ def _draw(
     return raw[:n].copy(), side[:n].copy(), offsets
 
 
-def _spectrum(runs: _Runs, axis: int, is_inner: Flags) -> _Spectrum:
+def _spectrum(runs: Runs, axis: int, is_inner: Flags) -> _Spectrum:
     """Return how periodic the places of the sides across an axis are."""
     across = is_inner & (runs.axis != axis)
     place, weight = runs.end[across, axis].astype(np.int64), runs.length[across]
@@ -302,7 +256,7 @@ def _hexagon(along: _Spectrum, up: _Spectrum) -> float | None:
     return _whole(2.0 * column.period)
 
 
-def _stairs(runs: _Runs, is_inner: Flags) -> tuple[Flags, Flags]:
+def _stairs(runs: Runs, is_inner: Flags) -> tuple[Flags, Flags]:
     """Tell which runs stand in stairs, between a left and a right bend, and which of them are steps."""
     along = runs.end - runs.begin
     turn = np.zeros(len(along))  # at the end of each run; 0 at the end of its chain
