@@ -107,6 +107,8 @@ class Run:
         What the file says of pixel size and place.
     notes : tuple of str
         What the reader chose or found, in words.
+    too_wide : bool
+        No part of the picture is as wide as the tolerance, which was left out.
     """
 
     options: MeshOptions
@@ -126,6 +128,7 @@ class Run:
     seconds: Mapping[str, float]
     calibration: Calibration = field(default_factory=Calibration)
     notes: tuple[str, ...] = ()
+    too_wide: bool = False
 
 
 class Memory:
@@ -213,7 +216,8 @@ def run(
     with timed("absorb"):
         absorbed = made("absorbed", absorb_thin, clean, options.absorbing(picture.materials, noise.step))
     labels = made("labels", drop_materials, absorbed.image, options.drop)
-    smoothing = options.smoothing(picture.materials, (step[0] * absorbed.times, step[1] * absorbed.times))
+    asked = replace(options, tolerance=0.0) if absorbed.too_wide else options
+    smoothing = asked.smoothing(picture.materials, (step[0] * absorbed.times, step[1] * absorbed.times))
     meshing = options.meshing(picture.materials)
     true = true_shape(labels.shape, options.pixel_sides)
     with timed("boundary"):
@@ -242,6 +246,7 @@ def run(
         seconds=FrozenMapping(timed.seconds),
         calibration=calibration,
         notes=notes,
+        too_wide=absorbed.too_wide,
     )
 
 

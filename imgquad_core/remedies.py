@@ -54,16 +54,21 @@ def thin_features(labels: LabelImage, mesh: QuadMesh, options: MeshOptions) -> s
 def lost_materials(done: Run) -> tuple[str, ...]:
     """Name the materials that a tolerance took half or more of, or say that it is too wide, with the remedies."""
     names, n_pixels = done.clean.materials.name_of, done.clean.labels.size
-    if done.absorbed and not any(row.lost for row in done.absorbed) and len(done.pixel_boundary.region_label) > 1:
-        widest = widest_part(done.clean)
-        if widest <= done.options.tolerance:
-            return (
-                f"tolerance {done.options.tolerance:g} px: no part of the picture is that wide (the widest: "
-                f"{widest:.0f} px), so nothing was absorbed; lower the tolerance",
-            )
+    if done.too_wide and len(done.pixel_boundary.region_label) > 1:
+        return (_too_wide(done),)
     return tuple(
         f"material {names(row.material)} loses {row.lost / row.pixels:.0%} of its area: it is thinner than "
         f"{done.options.tolerance:g} px; keep it (keep {names(row.material)}) or lower the tolerance"
         for row in done.absorbed
         if row.lost > MUCH * row.pixels and (row.pixels >= MATTERS * n_pixels or row.absorbed == row.regions)
     )
+
+
+def _too_wide(done: Run) -> str:
+    tolerance, widest = done.options.tolerance, widest_part(done.clean)
+    found = (
+        f"no part of the picture is that wide (the widest: {widest:.0f} px)"
+        if widest <= tolerance
+        else f"no region of the picture has its square, {tolerance**2:.0f} pixels"
+    )
+    return f"tolerance {tolerance:g} px: {found}, so it is meshed as without a tolerance; lower it"

@@ -72,6 +72,7 @@ class Absorbed(NamedTuple):
     times: int
     materials: tuple[Absorption, ...]  #: none where nothing was asked for
     is_noisy: bool = False  #: materials were given places by their density: regions are the rest of nothing
+    too_wide: bool = False  #: no part is as wide as the tolerance: all is as without one
 
 
 def absorb_thin(image: LabelImage, options: AbsorbOptions) -> Absorbed:
@@ -96,7 +97,11 @@ def absorb_thin(image: LabelImage, options: AbsorbOptions) -> Absorbed:
     image = turn.image(image)
     before = enlarged_labels(image.labels, times)
     radius, rule = 0.5 * options.tolerance * times, corner_rule(options.policy, options.step * times)
-    after, is_noisy = _absorbed(before, np.isin(before, [VOID, *options.keep]), radius, rule)
+    stays = np.isin(before, [VOID, *options.keep])
+    after, is_noisy = _absorbed(before, stays, radius, rule)
+    if after is before and not (_kept(before, stays, radius, rule) & (before != VOID)).any():
+        image, accounts = turn.image_back(image), _accounts(before, after, times, options)
+        return Absorbed(image, image, 1, accounts, too_wide=True)
     middle = after[times // 2 :: times, times // 2 :: times]
     enlarged = LabelImage(after, image.materials)
     small = enlarged if times == 1 else LabelImage(middle, image.materials)

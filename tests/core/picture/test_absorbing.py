@@ -102,7 +102,33 @@ def test_a_tolerance_wider_than_all_parts_is_told_with_the_remedy() -> None:
     assert np.array_equal(done.labels.labels, labels)
     (told,) = lost_materials(done)
     assert "no part of the picture is that wide (the widest: 20 px)" in told
-    assert "lower the tolerance" in told
+    assert "as without a tolerance; lower it" in told
+
+
+@pytest.mark.parametrize("tolerance", [4.0, 40.0])
+def test_a_tolerance_wider_than_all_parts_gives_the_mesh_without_one(tolerance: float) -> None:
+    labels = np.random.default_rng(1).integers(0, 3, (30, 30)).astype(np.int32)
+    labels[:12, :12] = voronoi(12, 12, 4, 1)
+    labels = labels if tolerance == 40.0 else (np.indices((30, 30)).sum(axis=0) // 2 % 2).astype(np.int32)
+    done, plain = (run(label_image(labels), MeshOptions(size=6.0, tolerance=t)) for t in (tolerance, 0.0))
+    assert_accounted(done)
+    assert np.array_equal(done.mesh.quads, plain.mesh.quads)
+    assert np.array_equal(done.mesh.points, plain.mesh.points)
+    assert len(lost_materials(done)) == 1
+
+
+def test_a_tolerance_whose_square_no_region_has_is_told() -> None:
+    labels = np.zeros((20, 20), np.int32)
+    labels[0, 0] = 1
+    done = run(label_image(labels), MeshOptions(size=4.0, tolerance=19.99))
+    assert np.array_equal(done.labels.labels, labels)
+    assert "no region of the picture has its square, 400 pixels" in lost_materials(done)[0]
+
+
+def test_what_is_kept_is_as_wide_as_any_tolerance() -> None:
+    done = run(label_image(stripe(9)[:20]), MeshOptions(size=8.0, tolerance=32.0, keep=(0, 1)))
+    assert not done.too_wide
+    assert lost_materials(done) == ()
 
 
 def test_rests_have_the_area_of_what_they_are_the_rest_of() -> None:
