@@ -37,6 +37,7 @@ from .zooms import Step, larger, unrounded
 
 _ROOM = 0.35  # of the local feature size of the pixel boundary: two foreign points that both move it cannot meet
 _SHARE = 0.75  # of the largest shift that smoothing may use; the rest is for areas
+_FOR_ARMS = 1.5  # of the largest shift, with a tolerance: regions get the areas of arms back that it took
 _NARROW = 2.0  # px; least reach of the local feature size that bounds shifts
 SEAM_ROOM = 1.5  # of the size asked for: seams keep it from boundaries, so that elements fit between
 _ARC_RATIO = 2.0  # arc over distance of a foreign point of the pixel boundary
@@ -104,6 +105,10 @@ def smooth_chains(
     real = without_seams(curves, ends, is_seam)
     room = np.zeros(len(curves.raw))
     room[real.kept] = _room(real.curves, is_corner[real.kept], options.max_shift, threads)
+    most, free = options.max_shift, room
+    if width > 1.0:
+        most, free = _FOR_ARMS * most, room.copy()
+        free[real.kept] = _room(real.curves, is_corner[real.kept], most, threads)
     node = place_junctions(curves, real.ends, room, chains.graph.shape)
     smooth = _smooth(curves, node, is_corner, room, is_seam, threads)
     lay_seams(smooth, curves, is_seam, SEAM_ROOM * options.size / true.unit)
@@ -124,7 +129,7 @@ def smooth_chains(
         return smooth_chains(graph, options, shape, barred, seams, before | crossed.chains)
     sides = pores.sides[which]
     wanted = areas / true.unit**2 + moved_areas(smooth, curves, is_seam, sides, len(areas))
-    nodes = restore_areas_freely(sides, wanted, draft, nodes, room, options.max_shift, gently)
+    nodes = restore_areas_freely(sides, wanted, draft, nodes, free, most, gently)
     nodes = nodes._replace(points=snapped(nodes.points * true.unit))
     region_pixels = np.maximum(np.rint(areas[: len(graph.region_pixels)]), 1).astype(np.int64)
     return Smoothed(_graph(replace(chains.graph, shape=true.shape, region_pixels=region_pixels), draft, nodes), which)

@@ -9,6 +9,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from imgquad_core.errors import InputError
 from imgquad_core.geometry.corner_rule import corner_rule
+from imgquad_core.measures.quality import region_areas
 from imgquad_core.options import MeshOptions
 from imgquad_core.picture import AbsorbOptions, absorb_thin, areas_of_origin
 from imgquad_core.picture.cores import PX, distances, flood, near_core
@@ -137,6 +138,17 @@ def test_rests_have_the_area_of_what_they_are_the_rest_of() -> None:
     areas = areas_of_origin(before, after, corner_rule("minority"))
     assert areas.sum() == pytest.approx(3600)
     assert sorted(areas) == pytest.approx([180, 3420], rel=0.03)
+
+
+def test_a_region_gets_back_the_area_of_its_arms() -> None:
+    labels = np.zeros((120, 120), np.int32)
+    labels[40:80, 40:80] = 1
+    for row in (46, 70):
+        labels[row : row + 5, 10:110] = 1
+    done = run(label_image(labels), MeshOptions(size=16.0, tolerance=8.0))
+    assert np.count_nonzero(done.labels.labels == 1) < 1750
+    area = region_areas(done.mesh)[done.mesh.region_label == 1].sum()
+    assert area == pytest.approx(np.count_nonzero(labels == 1), rel=0.02)
 
 
 @pytest.mark.parametrize("tolerance", [2.0, 5.0, 9.0])
