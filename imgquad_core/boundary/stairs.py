@@ -29,7 +29,7 @@ from imgquad_core.model import BoundaryGraph, PointKind
 
 from .curves import PIXEL_CORNER, PixelChains, numbered, on_frame, pixel_chains
 from .runs import Runs, runs_of
-from .zooms import Step, fine_step
+from .zooms import Step, fine_step, is_zoom
 
 _FEWEST_SIDES = 30  # across an axis, for a spectrum
 _LONGEST = 24.0  # px, of the periods that are looked for; the shortest is 2: places are whole numbers
@@ -38,10 +38,12 @@ _BESIDE = 8  # frequencies to each side that a peak is higher than
 _PEAK, _OF_HIGHEST = 0.3, 0.8  # least height of a peak, alone and over the highest one
 _FEWEST_STEPS, _IN_A_ROW = 8, 3  # steps of a picture that can tell their width; of one run that count as a stair
 _ALIKE, _LEAST_MEAN = 0.6, 1.25  # share of the steps of the width, and its least mean, px
+_LEAST_OF_PERIOD = 0.75  # the same, over the period: steps are the shorter ones of 1 and 2 px
 _SHORT, _FEW_SHORT = 0.6, 0.02  # of the width; share of runs below it, at most
 _CLEAR, _OFF = 0.6, 1.0  # least height of the peak, and its distance in px from the mean step
 _HEX_LEAST, _HEX_OFF, _HEX_CLEAR = 2.0, 0.03, 0.2  # least distance of rows, px; off sqrt(3) at most; height there
 _HEX_RUNS = 60  # across an axis: the few of some rectangles have periods by chance
+_NARROWEST, _NARROW_PLACES = 1.4, 60  # px, of data points below 2 px; different places across an axis that tell of them
 _TINY = 1e-9  # data points
 _WHOLE = 0.004  # a period this near a whole number, relative, is that number
 
@@ -85,7 +87,7 @@ def find_step(graph: BoundaryGraph) -> Step:
     spectra = [_spectrum(runs, axis, is_inner) for axis in (0, 1)]
     if hexagon := _hexagon(*spectra) or _hexagon(*spectra[::-1]):
         return hexagon, hexagon
-    peaks = [_peak(spectrum, _PEAK) for spectrum in spectra]
+    peaks = [_narrow_or(_peak(spectra[a], _PEAK), spectra[a], runs, a, is_inner) for a in (0, 1)]
     is_stair, is_step = _stairs(runs, is_inner)
     found = [_width(runs.length, is_stair & (runs.axis == a), is_step & (runs.axis == a), peaks[a]) for a in (0, 1)]
     width, height = (found[a] or found[1 - a] or 1.0 for a in (0, 1))
@@ -237,6 +239,22 @@ def _peak(spectrum: _Spectrum, least: float) -> _Peak:
     return _Peak(number / found[0], float(height[found[0]])) if len(found) else _NO_PEAK
 
 
+def _narrow_or(peak: _Peak, spectrum: _Spectrum, runs: Runs, axis: int, is_inner: Flags) -> _Peak:
+    """Find data points of less than 2 px, by pixel sides that are missing; else return the peak.
+
+    At whole numbers waves of k px look as those of k / (k - 1) px, which the spectrum has.
+    """
+    across = is_inner & (runs.axis != axis)
+    places, weight, number = runs.end[across, axis], runs.length[across], spectrum.number
+    if peak.height >= _CLEAR and (_whole(peak.period).is_integer() or is_zoom(places, weight, peak.period)):
+        return peak
+    low, high = int(np.ceil(number * (1.0 - 1.0 / _NARROWEST))), number // 2
+    if low >= high or len(np.unique(places)) < _NARROW_PLACES:
+        return peak
+    period = number / (number - (low + int(np.argmax(spectrum.height[low:high]))))
+    return _Peak(period, 1.0) if is_zoom(places, weight, period) else peak
+
+
 def _highest_near(height: Floats) -> Floats:
     """Return the largest of each value and those up to `_BESIDE` places away."""
     padded = np.pad(height, _BESIDE, constant_values=-np.inf)
@@ -287,7 +305,12 @@ def _width(length: Floats, is_stair: Flags, is_step: Flags, peak: _Peak) -> floa
     mean = float(alike.mean())
     short = float(np.mean(length[is_stair] < _SHORT * m))
     is_clear = peak.height >= _CLEAR and abs(peak.period - mean) <= _OFF
-    if not (is_clear and len(alike) >= _ALIKE * len(steps) and mean >= _LEAST_MEAN and short <= _FEW_SHORT):
+    if not (
+        is_clear
+        and len(alike) >= _ALIKE * len(steps)
+        and mean >= min(_LEAST_MEAN, _LEAST_OF_PERIOD * peak.period)
+        and short <= _FEW_SHORT
+    ):
         return 1.0
     return _whole(peak.period)
 

@@ -20,7 +20,8 @@ from imgquad_core.arrays import Flags, Floats, Ints
 from .curves import PixelChains, on_frame
 from .runs import Runs, runs_of
 
-_OFF = 0.65  # px that a side is off at most: half, and what the fit is off
+_OFF, _SURELY_OFF = 0.65, 0.58  # px that a side is off at most: half, and what the fit is off; that tells of a zoom
+_LEAST = 1.4  # px, of data points: of narrower ones every pixel side is near one of theirs
 _SHARE = 0.95  # of the sides, by length, that are at sides of data points
 _FITS = 4
 
@@ -66,6 +67,16 @@ def fine_step(chains: PixelChains, step: Step) -> Step:
     runs = runs_of(chains)
     width, height = (sides.step if sides else k for k, sides in zip(step, _sides(chains, runs, step), strict=True))
     return width, height
+
+
+def is_zoom(places: Floats, weight: Floats, step: float) -> bool:
+    """Tell whether all places of pixel sides, of that length, can be sides of data points about `step` wide."""
+    found = _lattice(places, weight, step)
+    if found is None:
+        return False
+    fits = found.off(places) <= _SURELY_OFF
+    sides, numbers = np.unique(places[fits]), np.unique(found.number(places[fits]))  # each side is at one place
+    return bool(weight[fits].sum() >= _SHARE * weight.sum() and _SHARE * len(sides) <= len(numbers))
 
 
 def unrounded(chains: PixelChains, step: Step) -> tuple[PixelChains, Step]:
@@ -136,7 +147,7 @@ def _sides(chains: PixelChains, runs: Runs, step: Step) -> list[_Sides | None]:
 
 def _lattice(places: Floats, weight: Floats, step: float) -> _Lattice | None:
     """Find the sides of data points near a step; None where too few pixel sides are theirs."""
-    if step.is_integer() or len(places) == 0:
+    if step.is_integer() or step < _LEAST or len(places) == 0:
         return None
     turns = np.angle((weight * np.exp(2j * np.pi / step * places)).sum()) / (2.0 * np.pi)
     found = _Lattice(step, float(step * turns))

@@ -78,3 +78,14 @@ def test_sides_that_are_none_of_data_points_stay(step: tuple[float, float]) -> N
     moved, same = unrounded(chains, step)
     assert same == step
     assert np.array_equal(moved.graph.points, chains.graph.points)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("times", [1.5, 1.6, 1.7, 1.9])
+def test_data_points_of_one_and_two_pixels_are_seen_by_the_sides_that_are_missing(times: float, way: str) -> None:
+    assert find_step(boundary(zoomed(GRAINS, times, way))) == pytest.approx((times, times), rel=3e-3)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_pixels_are_no_narrow_data_points(seed: int) -> None:
+    assert find_step(boundary(voronoi(90, 90, 12 + 2 * seed, seed))) == (1.0, 1.0)
