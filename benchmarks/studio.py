@@ -1,6 +1,6 @@
 """Times of the studio in a real browser, beside the bars: `python benchmarks/studio.py [COLUMNS ROWS SIZE]`.
 
-Prints wall seconds, and CPU seconds of the worker where these say more on a machine that others use.
+Prints wall seconds, and CPU seconds of the processes, which say more on a machine that others use.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -47,12 +48,23 @@ def memory(pid: int) -> dict[str, float]:
 
 
 def children(pid: int) -> list[int]:
-    found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return [int(child) for child in found]
+    try:
+        found = " ".join(each.read_text() for each in Path(f"/proc/{pid}/task").glob("*/children"))
+    except (FileNotFoundError, ProcessLookupError):
+        return []
+    return [int(child) for child in found.split()]
+
+
+def family(pid: int) -> list[int]:
+    """A process, its children, and theirs."""
+    return [pid, *(each for child in children(pid) for each in family(child))]
 
 
 def cpu(pid: int) -> float:
-    parts = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    try:
+        parts = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
     return (int(parts[11]) + int(parts[12])) / os.sysconf("SC_CLK_TCK")
 
 
@@ -71,13 +83,27 @@ class Bench:
         """The fork server's children."""
         return [each for server in children(self.studio.process.pid) for each in children(server)]
 
+    @property
+    def used(self) -> dict[str, float]:
+        """CPU seconds so far."""
+        browser = set(family(os.getpid())) - set(family(self.studio.process.pid)) - {os.getpid()}
+        return {
+            "worker": sum(map(cpu, self.workers)),
+            "server": cpu(self.studio.process.pid),
+            "browser": sum(map(cpu, browser)),
+        }
+
+    @contextmanager
+    def timing(self, name: str) -> Iterator[None]:
+        before, start = self.used, time.perf_counter()
+        yield
+        wall, used = time.perf_counter() - start, self.used
+        self.told(name, wall, "; CPU s: " + ", ".join(f"{who} {used[who] - before[who]:.2f}" for who in used))
+
     def timed(self, name: str, act: Callable[[], Any], expression: str) -> None:
-        before = sum(map(cpu, self.workers))
-        start = time.perf_counter()
-        act()
-        self.until(expression)
-        wall = time.perf_counter() - start
-        self.told(name, wall, f", worker {sum(map(cpu, self.workers)) - before:.2f} s of CPU")
+        with self.timing(name):
+            act()
+            self.until(expression)
 
     def told(self, name: str, value: float, more: str = "") -> None:
         print(f"{name:24} {value:8.2f}   bar {BARS[name]:g}{more}", flush=True)
@@ -90,9 +116,8 @@ def fresh(stage: str) -> str:
 def measure(bench: Bench, picture: Path, size: float) -> None:
     page, studio = bench.page, bench.studio
     bench.timed("picture seen", lambda: page.set_input_files("#file", str(picture)), "studio.view.size[0] > 1")
-    start = time.perf_counter()
-    bench.until(fresh("segment"))
-    bench.told("classes", time.perf_counter() - start)
+    with bench.timing("classes"):
+        bench.until(fresh("segment"))
     page.click("#step1")
     bench.until(fresh("denoise"))
     slide = "([id, v]) => { const e = document.getElementById(id); e.value = v; e.dispatchEvent(new Event('input')); }"
@@ -105,20 +130,16 @@ def measure(bench: Bench, picture: Path, size: float) -> None:
     page.evaluate(slide, ["size", size])
     time.sleep(0.3)
     ping = []
-    start = time.perf_counter()
-    before = sum(map(cpu, bench.workers))
-    if page.locator("#meshnow").is_enabled():  # size is not the default, with which the step began
-        page.click("#meshnow")
-    while not page.evaluate("Boolean(studio.results.mesh)"):
-        asked = time.perf_counter()
-        studio.ask("GET", "/icon.svg")
-        ping.append(1000 * (time.perf_counter() - asked))
-        time.sleep(0.02)
-    used = sum(map(cpu, bench.workers)) - before
-    bench.told("mesh there", time.perf_counter() - start, f", worker {used:.2f} s of CPU")
-    start = time.perf_counter()
-    bench.until("studio.view.quads && studio.view.asked === undefined")
-    bench.told("mesh shown", time.perf_counter() - start)
+    with bench.timing("mesh there"):
+        if page.locator("#meshnow").is_enabled():  # size is not the default, with which the step began
+            page.click("#meshnow")
+        while not page.evaluate("Boolean(studio.results.mesh)"):
+            asked = time.perf_counter()
+            studio.ask("GET", "/icon.svg")
+            ping.append(1000 * (time.perf_counter() - asked))
+            time.sleep(0.02)
+    with bench.timing("mesh shown"):
+        bench.until("studio.view.quads && studio.view.asked === undefined")
     print(page.evaluate("studio.results.mesh.quality.n_quads"), "quads")
     bench.told("ping, median ms", statistics.median(ping))
     bench.told("ping, most ms", max(ping))

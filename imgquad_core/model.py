@@ -6,6 +6,7 @@ Coordinates are float64 (x right, y up, in pixels): pixel (row, column) of a pic
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Bytes, Floats, Ints, Labels, Value
+from .frozen import FrozenMapping
 
 VOID = -1  #: label of a pixel, or region beside a chain, that is not meshed
 
@@ -86,11 +88,11 @@ class LabelImage(Value):
         """(n_rows, n_cols)."""
         return self.labels.shape[0], self.labels.shape[1]
 
-    @property
-    def pixels(self) -> dict[int, int]:
+    @cached_property
+    def pixels(self) -> Mapping[int, int]:
         """Number of pixels of each material that occurs, ascending by the material's number."""
         numbers, counts = _counted(self.labels)
-        return {int(n): int(count) for n, count in zip(numbers, counts, strict=True) if n != VOID}
+        return FrozenMapping({int(n): int(count) for n, count in zip(numbers, counts, strict=True) if n != VOID})
 
 
 def _counted(labels: Labels) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -7,16 +7,18 @@ Quality Library", SAND2007-1751.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.declared import Declaration
 from imgquad_core.errors import QualityError
 from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.grouping import linked
+from imgquad_core.jit import kernel
 from imgquad_core.model import QuadMesh
 
 MIN_QUALITY = Declaration(0.0, "least scaled Jacobian that is asked for", float, least=-1.0, most=1.0)
@@ -93,8 +95,7 @@ def quality_report(mesh: QuadMesh) -> QualityReport:
     QualityReport
     """
     corners = _corners(mesh.points, mesh.quads)
-    sj, angles, ratio = _least_sines(corners), _angles(corners), _aspects(corners)
-    inner = inner_nodes(mesh)
+    sj, angles, ratio = scaled_jacobian(mesh.points, mesh.quads), _angles(corners), _aspects(corners)
     low, high = GOOD_ANGLES
     return QualityReport(
         n_points=mesh.n_points,
@@ -107,8 +108,8 @@ def quality_report(mesh: QuadMesh) -> QualityReport:
         min_angle=float(angles.min()),
         max_angle=float(angles.max()),
         good_angles=float(((angles >= low) & (angles <= high)).all(axis=0).mean()),
-        inner_nodes=int(np.count_nonzero(inner)),
-        irregular=float(np.mean(mesh.valence[inner] != 4)) if inner.any() else 0.0,
+        inner_nodes=int(np.count_nonzero(inner_nodes(mesh))),
+        irregular=irregular_share(mesh),
         max_valence=int(mesh.valence.max()),
         aspect_99_percent=float(np.quantile(ratio, 0.99)),
         max_aspect=float(ratio.max()),
@@ -117,7 +118,31 @@ def quality_report(mesh: QuadMesh) -> QualityReport:
 
 def scaled_jacobian(points: Floats, quads: Ints) -> Floats:
     """Return the least sine of each quad's corner angles, shape (n_quads,); 0 where an edge has no length."""
-    return _least_sines(_corners(points, quads))
+    return _least_sines(_to_read(points, np.float64), _to_read(quads, np.int64))
+
+
+def _to_read(values: NDArray[Any], dtype: DTypeLike) -> NDArray[Any]:
+    """Return a view of one kind, for which one version of the kernel is compiled."""
+    view = np.ascontiguousarray(values, dtype).view()
+    view.flags.writeable = False
+    return view
+
+
+@kernel
+def _least_sines(points: Floats, quads: Ints) -> Floats:
+    least = np.full(len(quads), np.inf)
+    for q in range(len(quads)):
+        p = quads[q, 3]
+        ax, ay = points[quads[q, 0], 0] - points[p, 0], points[quads[q, 0], 1] - points[p, 1]
+        before = np.hypot(ax, ay)
+        for k in range(4):  # at corner p, edge a comes in and edge b goes out
+            p, n = quads[q, k], quads[q, (k + 1) & 3]
+            bx, by = points[n, 0] - points[p, 0], points[n, 1] - points[p, 1]
+            length = np.hypot(bx, by)
+            product = length * before
+            least[q] = min(least[q], (ax * by - ay * bx) / product if product > 0.0 else 0.0)
+            ax, ay, before = bx, by, length
+    return least
 
 
 def corner_angles(points: Floats, quads: Ints) -> Floats:
@@ -153,6 +178,12 @@ def inner_nodes(mesh: QuadMesh) -> Flags:
     inner = mesh.valence > 0
     inner[mesh.constraints.ravel()] = False
     return inner
+
+
+def irregular_share(mesh: QuadMesh) -> float:
+    """Return the share of inner nodes that have other than four quads, 0 where there are none."""
+    inner = inner_nodes(mesh)
+    return float(np.mean(mesh.valence[inner] != 4)) if inner.any() else 0.0
 
 
 def sectors_of(mesh: QuadMesh) -> Ints:
@@ -194,11 +225,12 @@ def forced_quads(mesh: QuadMesh, limit: float) -> Flags:
 def bad_places(mesh: QuadMesh, limit: float, most: int = 10) -> list[BadPlace]:
     """Describe the quads whose scaled Jacobian is below `limit`, worst first, at most `most`."""
     sj = scaled_jacobian(mesh.points, mesh.quads)
-    worst = np.argsort(sj, kind="stable")[:most]
-    worst = worst[sj[worst] < limit]
+    below = np.flatnonzero(sj < limit)
+    worst = below[np.argsort(sj[below], kind="stable")[:most]]
     if not len(worst):
         return []
-    sectors = sector_angles(mesh)
+    around, near = _around(mesh, worst)
+    sectors = sector_angles(near)
     forced = (best_sine(sectors) < limit).any(axis=1)
     centres = mesh.points[mesh.quads[worst]].mean(axis=1)
     return [
@@ -208,12 +240,20 @@ def bad_places(mesh: QuadMesh, limit: float, most: int = 10) -> list[BadPlace]:
             y=float(centre[1]),
             scaled_jacobian=float(sj[q]),
             material=int(mesh.quad_material[q]),
-            neighbours=_materials_around(mesh, int(q)),
-            sector_angle=float(sectors[q].min()),
-            forced=bool(forced[q]),
+            neighbours=_materials_around(near, int(at)),
+            sector_angle=float(sectors[at].min()),
+            forced=bool(forced[at]),
         )
-        for q, centre in zip(worst, centres, strict=True)
+        for q, at, centre in zip(worst, np.searchsorted(around, worst), centres, strict=True)
     ]
+
+
+def _around(mesh: QuadMesh, quads: Ints) -> tuple[Ints, QuadMesh]:
+    """Return the quads that share a node with some, ascending, and a mesh of them: whole sectors at these nodes."""
+    is_theirs = np.zeros(mesh.n_points, bool)
+    is_theirs[mesh.quads[quads]] = True
+    around = np.flatnonzero(is_theirs[mesh.quads].any(axis=1))
+    return around, replace(mesh, quads=mesh.quads[around], quad_region=mesh.quad_region[around])
 
 
 def require_quality(mesh: QuadMesh, limit: float, most: int = 5) -> None:
@@ -246,12 +286,6 @@ class _Corners(NamedTuple):
     cross: Floats  # product of the two edges at each corner
     dot: Floats
     lengths: Floats  # of the edge that leaves it
-
-
-def _least_sines(corners: _Corners) -> Floats:
-    product = corners.lengths * np.roll(corners.lengths, 1, axis=0)
-    sines = np.divide(corners.cross, product, out=np.zeros_like(product), where=product > 0.0)
-    return np.asarray(sines.min(axis=0))
 
 
 def _angles(corners: _Corners) -> Floats:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Floats, Labels
-from imgquad_core.measures import scaled_jacobian
 from imgquad_core.model import BoundaryGraph, LabelImage, Materials, QuadMesh
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -68,18 +67,18 @@ def pack_lines(graph: BoundaryGraph, frame: Frame) -> Arrays:
     return {"lines": frame(graph.points)[graph.segments].reshape(-1, 4)}
 
 
-def pack_quads(mesh: QuadMesh, frame: Frame) -> Arrays:
+def pack_quads(mesh: QuadMesh, jacobians: Floats, frame: Frame) -> Arrays:
     """Return corners (n, 8), scaled Jacobians, places in the table of materials and numbers of quads.
 
     Quads that lie together stand together, so that the page can leave out blocks of them that are not in view.
     """
     points = frame(mesh.points)
     order = np.argsort(_morton(points[mesh.quads[:, 0]]), kind="stable")
-    quads = mesh.quads[order]
+    places = np.searchsorted(mesh.materials.labels, mesh.region_label).astype(np.uint16)
     return {
-        "corners": points[quads].reshape(-1, 8),
-        "jacobians": scaled_jacobian(mesh.points, quads).astype(np.float32),
-        "places": np.searchsorted(mesh.materials.labels, mesh.quad_material[order]).astype(np.float32),
+        "corners": points[mesh.quads[order]].reshape(-1, 8),
+        "jacobians": jacobians.astype(np.float32)[order],
+        "places": places[mesh.quad_region[order]],
         "quads": order.astype(np.uint32),
     }
 

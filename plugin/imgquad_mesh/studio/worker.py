@@ -12,7 +12,7 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import perf_counter
@@ -25,8 +25,8 @@ from imgquad_core.declared import declarations
 from imgquad_core.errors import ImgquadError, InputError
 from imgquad_core.fe.properties import read_properties
 from imgquad_core.ledger import material_ledger
-from imgquad_core.measures import quality_report
-from imgquad_core.measures.quality import bad_places
+from imgquad_core.measures import scaled_jacobian
+from imgquad_core.measures.quality import bad_places, irregular_share
 from imgquad_core.model import LabelImage, Materials
 from imgquad_core.options import MeshOptions
 from imgquad_core.picture import Segmentation, SegmentationOptions, area_shares
@@ -40,6 +40,7 @@ from imgquad_mesh.memory import give_large_blocks_back, limit_memory
 from . import packing
 from .recipe import PROPERTIES, Recipe, recipe_of
 
+REST = 0.4  #: seconds between two figures of one stage: the browser draws each, which takes the work a core's 30 ms
 WORST, LOW = 12, 0.3  #: quads that the page lists, and the scaled Jacobian below which it tells whether they must be so
 Answer = tuple[dict[str, Any], bytes]
 Tell = Callable[[dict[str, Any]], None]
@@ -150,12 +151,16 @@ def _run(desk: Desk, task: Mapping[str, Any], tell: Tell, until: str) -> Run | N
     early = MeshOptions(**{name: getattr(recipe.options, name) for name in _EARLY})
 
     def progress(stage: str, number: float, total: int) -> None:
+        nonlocal told
         if stage == "denoise":
             desk.keep(task, early)
         if STAGES.index(stage) > STAGES.index(until):
             raise _Enough
-        tell({"stage": stage, "number": number, "of": STAGES.index(until) + 1})
+        if number == STAGES.index(stage) or perf_counter() - told > REST:
+            tell({"stage": stage, "number": number, "of": STAGES.index(until) + 1})
+            told = perf_counter()
 
+    told = perf_counter()
     tell({"stage": "read", "number": 0, "of": STAGES.index(until) + 1})
     desk.recall(task, early)
     try:
@@ -217,11 +222,12 @@ def _mesh(desk: Desk, task: Mapping[str, Any], tell: Tell) -> Answer:
     done = _run(desk, task, tell, "mesh")
     assert done is not None
     frame = packing.Frame(done.labels.shape, done.boundary.shape, done.options.crop)
-    arrays = packing.pack_quads(done.pixel_mesh, frame)
-    listed, data = packing.packed(arrays)
-    quality = quality_report(done.mesh)
+    jacobians = scaled_jacobian(done.pixel_mesh.points, done.pixel_mesh.quads)
+    listed, data = packing.packed(packing.pack_quads(done.pixel_mesh, jacobians, frame))
     ledger = material_ledger(done.picture, done.labels, done.boundary, done.mesh, done.options.pixel_sides)
-    told = {"quality": asdict(quality), "worst": _worst(done), "arrays": listed, "materials": _table(done.labels)}
+    quality = {"n_quads": done.mesh.n_quads, "n_points": done.mesh.n_points, "min_sj": float(jacobians.min())}
+    quality |= {"mean_sj": float(jacobians.mean()), "irregular": irregular_share(done.mesh)}
+    told = {"quality": quality, "worst": _worst(done), "arrays": listed, "materials": _table(done.labels)}
     return told | {"errors": {row.name: row.error for row in ledger if row.clean_pixels}}, data
 
 
