@@ -40,7 +40,6 @@ from imgquad_mesh.memory import give_large_blocks_back, limit_memory
 from . import packing
 from .recipe import PROPERTIES, Recipe, recipe_of
 
-REST = 0.4  #: seconds between two figures of one stage: the browser draws each, which takes the work a core's 30 ms
 WORST, LOW = 12, 0.3  #: quads that the page lists, and the scaled Jacobian below which it tells whether they must be so
 Answer = tuple[dict[str, Any], bytes]
 Tell = Callable[[dict[str, Any]], None]
@@ -52,6 +51,7 @@ class Desk:
 
     folder: Path
     pixels: int
+    rest: float = 0.4  #: seconds between two figures of a stage: the browser draws each, 30 ms of a core without GPU
     memory: Memory = field(default_factory=Memory)
     raw: dict[tuple[str, ReadOptions], Picture] = field(default_factory=dict)
     kept: Segmentation | None = None  #: the one that is in the folder, too
@@ -149,19 +149,19 @@ def _run(desk: Desk, task: Mapping[str, Any], tell: Tell, until: str) -> Run | N
     """Run the pipeline through a stage; None where it is not the last: the values are in the memory."""
     recipe = _recipe(desk, task)
     early = MeshOptions(**{name: getattr(recipe.options, name) for name in _EARLY})
+    last = "", 0.0
 
     def progress(stage: str, number: float, total: int) -> None:
-        nonlocal told
+        nonlocal last
         if stage == "denoise":
             desk.keep(task, early)
         if STAGES.index(stage) > STAGES.index(until):
             raise _Enough
-        if number == STAGES.index(stage) or perf_counter() - told > REST:
+        if stage != last[0] or perf_counter() - last[1] > desk.rest:
             tell({"stage": stage, "number": number, "of": STAGES.index(until) + 1})
-            told = perf_counter()
+            last = stage, perf_counter()
 
-    told = perf_counter()
-    tell({"stage": "read", "number": 0, "of": STAGES.index(until) + 1})
+    progress("read", 0, len(STAGES))
     desk.recall(task, early)
     try:
         return run(desk.picture(task, recipe.options), recipe.options, progress, desk.memory)

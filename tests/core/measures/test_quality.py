@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from imgquad_core import mesh_image
 from imgquad_core.measures import quality
 from imgquad_core.model import Materials, PointKind, QuadMesh
 
@@ -107,3 +108,17 @@ def test_bad_place_names_where_and_whether_the_picture_forces_it() -> None:
     points[1], points[0] = (1.0, 0.9), (0.0, 0.0)  # the border itself narrows the corner to 48 degrees
     bad = quality.bad_places(replace(mesh, points=points), limit=0.9)
     assert any(place.forced and place.sector_angle == pytest.approx(48.01, abs=0.01) for place in bad)
+
+
+def test_bad_places_are_told_as_the_whole_mesh_has_them() -> None:
+    labels = np.random.default_rng(2).integers(0, 3, (12, 15)).repeat(4, 0).repeat(4, 1)
+    mesh = mesh_image(labels)
+    sectors, sj = quality.sector_angles(mesh), quality.scaled_jacobian(mesh.points, mesh.quads)
+    places = quality.bad_places(mesh, limit=0.9, most=40)
+    assert [place.quad for place in places] == np.argsort(sj, kind="stable")[:40].tolist()
+    forced = quality.forced_quads(mesh, 0.9)
+    for place in places:
+        touching = np.isin(mesh.quads, mesh.quads[place.quad]).any(axis=1)
+        assert place.sector_angle == sectors[place.quad].min()
+        assert place.forced == forced[place.quad]
+        assert {place.material, *place.neighbours} == set(mesh.quad_material[touching].tolist())

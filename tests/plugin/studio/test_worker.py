@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 
 from imgquad_core import pipeline
 from imgquad_core.errors import InputError
+from imgquad_core.measures import quality_report, scaled_jacobian
 from imgquad_mesh.studio.packing import Frame, pack_quads, packed
 from imgquad_mesh.studio.worker import TASKS, Desk
 
@@ -56,13 +58,37 @@ def test_only_what_has_changed_is_made_anew(folder: Path, monkeypatch: pytest.Mo
         do(desk, "mesh", min_pixels=50, min_length=9)
 
 
+def test_the_page_is_told_what_a_report_says(folder: Path) -> None:
+    desk = Desk(folder, 10**6)
+    told = do(desk, "mesh", colors=2)["quality"]
+    report = asdict(quality_report(desk.memory["mesh"][1]))
+    assert told == {name: report[name] for name in told}
+    assert told["n_quads"] > 100
+
+
+def test_a_long_stage_tells_how_far_it_is_now_and_then(folder: Path) -> None:
+    def told(rest: float) -> list[dict[str, Any]]:
+        lines: list[dict[str, Any]] = []
+        task = {**TASK, "recipe": {"picture": "grey.npy", "options": {"size": 2.0}}}
+        TASKS["mesh"](Desk(folder, 10**6, rest), task, lines.append)
+        return lines
+
+    often = [line["number"] for line in told(0.0) if line["stage"] == "mesh"]
+    assert often == sorted(often)
+    assert len(often) > 2
+    assert [line["stage"] for line in told(600.0)] == list(pipeline.STAGES), "each stage as it starts"
+
+
 def test_quads_are_packed_as_the_picture_lies(folder: Path) -> None:
     done = pipeline.run(GREY)
-    arrays = pack_quads(done.pixel_mesh, Frame(done.labels.shape, done.boundary.shape, None))
+    jacobians = scaled_jacobian(done.pixel_mesh.points, done.pixel_mesh.quads)
+    arrays = pack_quads(done.pixel_mesh, jacobians, Frame(done.labels.shape, done.boundary.shape, None))
     corners = arrays["corners"].reshape(-1, 4, 2)
     assert corners.min() == 0
     assert corners.max(axis=(0, 1)).tolist() == [120, 80]
     assert sorted(arrays["quads"].tolist()) == list(range(done.mesh.n_quads))
+    assert arrays["jacobians"].tolist() == jacobians.astype(np.float32)[arrays["quads"]].tolist()
+    assert (done.mesh.materials.labels[arrays["places"]] == done.mesh.quad_material[arrays["quads"]]).all()
     x, y = corners.mean(axis=1).astype(int).T
     assert (done.labels.labels[y, x] == done.mesh.quad_material[arrays["quads"]]).mean() > 0.95, "row 0 is on top"
     listed, data = packed(arrays)

@@ -33,16 +33,21 @@ export async function run(task, signal, tell) {
     const line = JSON.parse(new TextDecoder().decode(rest.subarray(0, end)));
     rest = rest.subarray(end + 1);
     if (line.error) throw new Error(line.error);
-    if (line.done) return [line.done, await bytes(reader, rest)];
+    if (line.done) return [line.done, await bytes(reader, rest, line.bytes)];
     tell(line);
   }
 }
 
-// Reads to the end: the server takes the next task when the answer is out.
-async function bytes(reader, first) {
-  const parts = [first];
-  for (let { done, value } = await reader.read(); !done; { done, value } = await reader.read()) parts.push(value);
-  return joined(parts);
+// Reads so many bytes, and to the end: the server takes the next task when the answer is out.
+async function bytes(reader, first, n) {
+  const whole = new Uint8Array(n);
+  let at = 0;
+  for (let value = first, done = false; !done; { done, value } = await reader.read()) {
+    whole.set(value, at);
+    at += value.length;
+  }
+  if (at < n) throw new Error("the studio broke off: try again");
+  return whole;
 }
 
 function joined(parts) {

@@ -35,6 +35,7 @@ async function open(blob, name) {
     go(0);
   } catch (error) {
     at("drop").hidden = Boolean(picture);
+    at("bar").hidden = !picture;
     say(error.message);
   }
 }
@@ -47,6 +48,7 @@ async function decode(blob) {
     const by = LARGEST / Math.max(width, height), sides = { resizeWidth: Math.max(1, width * by), resizeHeight: Math.max(1, height * by) };
     const shown = by < 1 ? await createImageBitmap(image, { ...asIs, ...sides }) : image; // quick: shrunk by the decoder
     at("drop").hidden = true;
+    at("bar").hidden = false;
     showPicture(shown, [width, height]);
     return true;
   } catch {
@@ -57,7 +59,6 @@ async function decode(blob) {
 function showPicture(image, size) {
   app.view?.setPicture(image, size);
   app.view?.fit();
-  app.view?.draw();
 }
 
 // Work: one request under way; what changed meanwhile comes after it
@@ -143,17 +144,18 @@ async function look() {
 
 function take(stage, result) {
   app.results[stage] = result;
-  const { view } = app;
+  const { view } = app, { arrays } = result;
+  if (stage === "denoise" || stage === "smooth") delete result.arrays; // the view has them
   if (stage === "segment") {
     app.formats = result.formats;
     if (view && (view.size[0] !== result.columns || view.size[1] !== result.rows)) view.size = [result.columns, result.rows];
-    view?.setLabels("before", result.arrays.labels);
+    view?.setLabels("before", arrays.labels);
   }
   if (!view) return;
-  if (result.arrays.labels && stage !== "segment") view.setLabels("after", result.arrays.labels, partOf(result));
-  if (stage === "smooth") view.setLines(result.arrays.lines);
+  if (arrays.labels && stage !== "segment") view.setLabels("after", arrays.labels, partOf(result));
+  if (stage === "smooth") view.setLines(arrays.lines);
   if (stage === "mesh") {
-    view.setQuads(result.arrays);
+    view.setQuads(arrays);
     view.mark = null;
     view.range = [-9, 9];
   }
@@ -463,6 +465,7 @@ function buttons() {
 }
 
 async function start() {
+  const asked = api.askOptions(); // under way while the view is made
   try {
     app.view = new View(at("canvas"));
     app.view.listeners.push(overlay);
@@ -478,7 +481,7 @@ async function start() {
   steps();
   history.replaceState(null, "", "/"); // the token has become a cookie
   try {
-    const { options, given, learns } = await api.askOptions();
+    const { options, given, learns } = await asked;
     Object.assign(app, { declared: options, learns });
     if (given) await open(await api.givenPicture(), given);
   } catch (error) {

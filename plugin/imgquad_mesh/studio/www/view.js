@@ -7,8 +7,8 @@ const WIDE = 4096; // texels in a row of a table
 export const LARGEST = 4096; // side of a picture that is shown, as in packing.py
 const VOID = [0, 0, 0, 0];
 
-// Lines and quads are tables of four numbers in textures, fetched by the number of the vertex, six a line and four a quad:
-// instances would be simpler, but without a graphics card each one costs as much as a drawing (332,000 quads: minutes).
+// Lines are a table of four numbers each in a texture, fetched by the number of the vertex, six a line: instances would be
+// simpler, but without a graphics card each one costs as much as a drawing. Quads are four vertices, drawn block by block.
 const CAMERA = `#version 300 es
 precision highp float; precision highp int; precision highp sampler2D; precision highp usampler2D;
 uniform vec4 camera; // centre, and clip units a pixel of the picture
@@ -54,22 +54,14 @@ const LINES = {
     precision highp float; uniform vec4 ink; out vec4 color; void main() { color = ink; }`,
 };
 const QUADS = {
-  // table: corners in two entries a quad; traits: scaled Jacobian and place in the palette
-  vertex: `${CAMERA} uniform sampler2D table, traits, palette; uniform bool shaded; uniform vec2 range;
+  // ink: of the quad, the same at its four corners
+  vertex: `${CAMERA} layout(location = 0) in vec2 corner; layout(location = 1) in vec4 ink;
     out vec2 uv; flat out vec3 fill;
-    vec3 ramp(float t) { // Brewer's RdYlBu: told apart by colour-blind eyes, too
-      vec3 stops[5] = vec3[5](vec3(.843,.188,.153), vec3(.988,.553,.349), vec3(.996,.878,.565), vec3(.569,.749,.859), vec3(.271,.459,.706));
-      float s = clamp(t, 0., .9999) * 4.; int k = int(s);
-      return mix(stops[k], stops[k + 1], fract(s));
-    }
     void main() {
-      int quad = gl_VertexID / 4, k = gl_VertexID % 4;
-      vec4 two = entry(table, 2 * quad + k / 2);
-      gl_Position = seen(k % 2 == 0 ? two.xy : two.zw);
-      float jacobian = entry(traits, quad).x; int place = int(entry(traits, quad).y);
+      int k = gl_VertexID & 3;
+      gl_Position = seen(corner);
       uv = vec2(k == 1 || k == 2, k > 1);
-      fill = shaded ? ramp(jacobian) : texelFetch(palette, ivec2(place & 255, place >> 8), 0).rgb;
-      if (jacobian < range.x || jacobian > range.y) fill = mix(fill, vec3(.5), .85);
+      fill = ink.rgb;
     }`,
   fragment: `#version 300 es
     precision highp float; in vec2 uv; flat in vec3 fill; out vec4 color;
@@ -92,7 +84,9 @@ export class View {
     for (const name of ["before", "after"]) this.textures[name] = this._texture(gl.R8UI, 1, 1, gl.RED_INTEGER, gl.UNSIGNED_BYTE, new Uint8Array(1));
     this.size = [1, 1];
     this.part = null;
-    this.labels = { before: null, after: null };
+    this.labels = { before: null, after: false };
+    this.colors = [];
+    this.halves = this._buffer(gl.ELEMENT_ARRAY_BUFFER, halvesOf(BLOCK));
     this.camera = { x: 0.5, y: 0.5, scale: 1 };
     this.shown = { picture: true, lines: false, quads: false };
     this.opacity = 0.6;
@@ -103,7 +97,7 @@ export class View {
     this.cost = 0;
     this.frames = 0;
     this.listeners = [];
-    new ResizeObserver(() => (this.fitted && this.fit(), this.draw())).observe(canvas.parentElement);
+    new ResizeObserver(() => this._resized() && (this.fitted && this.fit(), this.draw())).observe(canvas.parentElement);
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => location.reload());
   }
@@ -132,15 +126,15 @@ export class View {
     this._put("picture", this._texture(gl.RGBA8, image.width, image.height, gl.RGBA, gl.UNSIGNED_BYTE, image));
     this.size = size;
     for (const name of ["lines", "quads", "mark"]) this[name] = void this._drop(this[name]);
-    this.labels = { before: null, after: null };
+    this.labels = { before: null, after: false };
     this.part = null;
   }
 
   setLabels(which, places, part = null) {
     const gl = this.gl, [rows, columns] = places.shape, wide = places.BYTES_PER_ELEMENT > 1;
     this._put(which, this._texture(wide ? gl.R16UI : gl.R8UI, columns, rows, gl.RED_INTEGER, wide ? gl.UNSIGNED_SHORT : gl.UNSIGNED_BYTE, places));
-    this.labels[which] = places;
-    if (which === "after") this.part = part;
+    if (which === "before") this.labels.before = places;
+    else [this.labels.after, this.part] = [true, part];
   }
 
   // Colours of the materials, in the order of their places; null is one that is not meshed.
@@ -148,6 +142,7 @@ export class View {
     const data = new Uint8Array(4 * 256 * Math.ceil((colors.length + 1) / 256));
     colors.forEach((color, k) => data.set(color ? [...rgb(color), 255] : VOID, 4 * k));
     const gl = this.gl;
+    this.colors = colors;
     this._put("palette", this._texture(gl.RGBA8, 256, data.length / 1024, gl.RGBA, gl.UNSIGNED_BYTE, data));
   }
 
@@ -156,44 +151,52 @@ export class View {
     this.lines = { table: this._table(lines), n: lines.length / 4 };
   }
 
-  setQuads({ corners, jacobians, places, quads }) {
+  setQuads({ corners, jacobians, places }) {
     this._drop(this.quads);
-    const traits = new Float32Array(2 * quads.length);
-    for (let q = 0; q < quads.length; q++) {
-      traits[2 * q] = jacobians[q];
-      traits[2 * q + 1] = places[q];
+    const gl = this.gl, buffers = [this._buffer(gl.ARRAY_BUFFER, corners), gl.createBuffer()];
+    this.quads = { corners, jacobians, places, buffers, n: jacobians.length, boxes: boxesOf(corners) };
+  }
+
+  // Gives the corners of all quads their colours, if these are others than before: grey outside `range`.
+  _ink() {
+    const { jacobians, places, n, buffers, inked } = this.quads, gl = this.gl, [low, high] = this.range;
+    const key = [this.shaded, low, high, ...this.colors].join();
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[1]);
+    if (key === inked) return;
+    const [full, pale] = inksOf(this.shaded ? SHADES : this.colors), inks = new Uint32Array(4 * n);
+    for (let q = 0; q < n; q++) {
+      const value = jacobians[q], from = value < low || value > high ? pale : full;
+      const ink = from[this.shaded ? Math.floor(Math.min(Math.max(value, 0), 0.9999) * SHADES.length) : places[q]];
+      for (let k = 4 * q; k < 4 * q + 4; k++) inks[k] = ink;
     }
-    const tables = { table: this._table(corners), traits: this._table(traits, 2), halves: this._halves(quads.length) };
-    this.quads = { ...tables, corners, quads, n: quads.length, boxes: boxesOf(corners) };
+    gl.bufferData(gl.ARRAY_BUFFER, inks, gl.STATIC_DRAW);
+    this.quads.inked = key;
   }
 
-  // A texture whose texels are the entries of an array, in rows of WIDE.
-  _table(data, parts = 4) {
-    const gl = this.gl, rows = Math.max(1, Math.ceil(data.length / parts / WIDE)), whole = new Float32Array(parts * WIDE * rows);
+  // A texture whose texels are fours of an array, in rows of WIDE.
+  _table(data) {
+    const gl = this.gl, rows = Math.max(1, Math.ceil(data.length / 4 / WIDE)), whole = new Float32Array(4 * WIDE * rows);
     whole.set(data);
-    return this._texture(parts === 4 ? gl.RGBA32F : gl.RG32F, WIDE, rows, parts === 4 ? gl.RGBA : gl.RG, gl.FLOAT, whole);
+    return this._texture(gl.RGBA32F, WIDE, rows, gl.RGBA, gl.FLOAT, whole);
   }
 
-  // The two triangles of each quad.
-  _halves(n) {
-    const gl = this.gl, made = gl.createBuffer(), corners = new Uint32Array(6 * n);
-    const order = [0, 1, 2, 0, 2, 3];
-    for (let k = 0; k < corners.length; k++) corners[k] = 4 * Math.floor(k / 6) + order[k % 6];
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, made);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+  _buffer(kind, data) {
+    const gl = this.gl, made = gl.createBuffer();
+    gl.bindBuffer(kind, made);
+    gl.bufferData(kind, data, gl.STATIC_DRAW);
     return made;
   }
 
   _drop(drawn) {
-    for (const name of ["table", "traits"]) this.gl.deleteTexture(drawn?.[name] ?? null);
-    this.gl.deleteBuffer(drawn?.halves ?? null);
+    this.gl.deleteTexture(drawn?.table ?? null);
+    drawn?.buffers?.forEach((buffer) => this.gl.deleteBuffer(buffer));
   }
 
   // Camera
 
   fit() {
-    const { width, height } = this._resized();
-    const scale = 0.96 * Math.min(width / this.size[0], height / this.size[1]);
+    this._resized();
+    const { width, height } = this.canvas, scale = 0.96 * Math.min(width / this.size[0], height / this.size[1]);
     this.look({ x: this.size[0] / 2, y: this.size[1] / 2, scale });
     this.fitted = true; // until it is moved, and so at another size of the window
   }
@@ -251,18 +254,20 @@ export class View {
 
   // Drawing
 
+  // Gives the canvas the size of its place; tells whether it had another.
   _resized() {
     const box = this.canvas.parentElement.getBoundingClientRect(), ratio = Math.min(devicePixelRatio || 1, 2);
     const [width, height] = [Math.max(1, Math.round(box.width * ratio)), Math.max(1, Math.round(box.height * ratio))];
-    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
-    return this.canvas;
+    if (this.canvas.width === width && this.canvas.height === height) return false;
+    return Boolean(Object.assign(this.canvas, { width, height }));
   }
 
   draw() {
     cancelAnimationFrame(this.asked);
     this.asked = undefined;
     clearTimeout(this.timer);
-    const start = performance.now(), gl = this.gl, { width, height } = this._resized();
+    this._resized();
+    const start = performance.now(), gl = this.gl, { width, height } = this.canvas;
     this.canvas.style.transform = "";
     gl.viewport(0, 0, width, height);
     gl.clearColor(...rgb(getComputedStyle(this.canvas.parentElement).backgroundColor).map((c) => c / 255), 1);
@@ -314,24 +319,22 @@ export class View {
   }
 
   _drawQuads() {
-    const gl = this.gl, places = this._use(this.programs.quads), { table, traits } = this.quads;
-    this._give(places, { table, traits, palette: this.textures.palette });
-    gl.uniform1i(places.shaded, this.shaded ? 1 : 0);
-    gl.uniform2f(places.range, ...this.range);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.quads.halves);
-    for (const [first, n] of this._runsInView()) gl.drawElements(gl.TRIANGLES, 6 * n, gl.UNSIGNED_INT, 24 * first);
-  }
-
-  // Neighbouring blocks in view, as [first quad, number of quads].
-  _runsInView() {
-    const runs = [], [x0, y0] = this.toPicture(0, 0), [x1, y1] = this.toPicture(this.canvas.clientWidth, this.canvas.clientHeight);
-    this.quads.boxes.forEach(([left, top, right, bottom], block) => {
-      if (right < x0 || left > x1 || bottom < y0 || top > y1) return;
-      const first = block * BLOCK, n = Math.min(BLOCK, this.quads.n - first), last = runs.at(-1);
-      if (last && last[0] + last[1] === first) last[1] += n;
-      else runs.push([first, n]);
+    const gl = this.gl, { boxes, buffers, n } = this.quads;
+    const [x0, y0] = this.toPicture(0, 0), [x1, y1] = this.toPicture(this.canvas.clientWidth, this.canvas.clientHeight);
+    this._use(this.programs.quads);
+    this._ink();
+    for (const place of [0, 1]) gl.enableVertexAttribArray(place);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.halves);
+    boxes.forEach(([left, top, right, bottom], block) => {
+      if (right < x0 || left > x1 || bottom < y0 || top > y1) return; // out of view
+      const first = block * BLOCK;
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffers[0]);
+      gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 32 * first);
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffers[1]);
+      gl.vertexAttribPointer(1, 4, gl.UNSIGNED_BYTE, true, 0, 16 * first);
+      gl.drawElements(gl.TRIANGLES, 6 * Math.min(BLOCK, n - first), gl.UNSIGNED_SHORT, 0);
     });
-    return runs;
+    for (const place of [0, 1]) gl.disableVertexAttribArray(place);
   }
 
   // What is where
@@ -382,6 +385,19 @@ function program(gl, { vertex, fragment }) {
   return { program: made, places: Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(made, name)])) };
 }
 
+// The two triangles of each of n quads.
+function halvesOf(n) {
+  const order = [0, 1, 2, 0, 2, 3];
+  return Uint16Array.from({ length: 6 * n }, (_, k) => 4 * Math.floor(k / 6) + order[k % 6]);
+}
+
+// Colours as four bytes each: as they are, and paled.
+function inksOf(colors) {
+  const bytes = colors.map((color) => rgb(color ?? "#000000"));
+  const packed = (change) => new Uint32Array(Uint8Array.from(bytes.flatMap((color) => [...color.map(change), 255])).buffer);
+  return [packed((c) => c), packed((c) => 0.15 * c + 0.85 * 128)];
+}
+
 function boxesOf(corners) {
   const boxes = [];
   for (let first = 0; first < corners.length; first += 8 * BLOCK) {
@@ -412,4 +428,10 @@ export function rgb(color) {
   return color.match(/\d+/g).slice(0, 3).map(Number);
 }
 
-export const RAMP = ["#d73027", "#fc8d59", "#fee090", "#91bfdb", "#4575b4"];
+export const RAMP = ["#d73027", "#fc8d59", "#fee090", "#91bfdb", "#4575b4"]; // Brewer's RdYlBu: told apart by colour-blind eyes, too
+const SHADES = Array.from({ length: 256 }, (_, k) => shadeOf((k / 255) * (RAMP.length - 1)));
+
+function shadeOf(at) {
+  const k = Math.min(Math.floor(at), RAMP.length - 2), [a, b] = [rgb(RAMP[k]), rgb(RAMP[k + 1])];
+  return `rgb(${a.map((c, i) => Math.round(c + (at - k) * (b[i] - c)))})`;
+}
