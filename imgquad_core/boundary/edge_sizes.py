@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags, Floats, Ints
-from imgquad_core.jit import kernel
+from imgquad_core.jit import kernel, verb
 
 from .curves import Curves
 from .feature_size import local_feature_size
@@ -131,18 +131,25 @@ def _chamfer(raster: NDArray[np.float32], straight: np.float32, slanting: np.flo
     step = 1 if forward else -1
     for i in range(n_rows):
         r = i if forward else n_rows - 1 - i
+        if i > 0:
+            _carry_over(raster, r - step, r, straight, slanting)
+        best = np.float32(np.inf)
         for j in range(n_cols):
             c = j if forward else n_cols - 1 - j
-            best = raster[r, c]
-            if j > 0:
-                best = min(best, raster[r, c - step] + straight)
-            if i > 0:
-                best = min(best, raster[r - step, c] + straight)
-                if c > 0:
-                    best = min(best, raster[r - step, c - 1] + slanting)
-                if c < n_cols - 1:
-                    best = min(best, raster[r - step, c + 1] + slanting)
+            best = min(raster[r, c], best + straight)
             raster[r, c] = best
+
+
+@verb
+def _carry_over(raster: NDArray[np.float32], since: int, to: int, straight: np.float32, slanting: np.float32) -> None:
+    """Carry sizes from one row to the next: no pixel waits for another, so that many are done at once."""
+    last = raster.shape[1] - 1
+    for c in range(last + 1):
+        raster[to, c] = min(raster[to, c], raster[since, c] + straight)
+    for c in range(last):
+        raster[to, c] = min(raster[to, c], raster[since, c + 1] + slanting)
+    for c in range(last):
+        raster[to, c + 1] = min(raster[to, c + 1], raster[since, c] + slanting)
 
 
 @kernel

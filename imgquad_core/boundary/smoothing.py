@@ -118,7 +118,7 @@ def smooth_chains(
     limit = per_point(curves, _asked_sizes(chains.graph, curves.is_frame, options) / true.unit)
     draft = Draft(
         curves, ends, smooth, node, is_corner, limit, options.edge_ratio, options.edge_multiple, true.extent,
-        true.grid, is_seam, real.ends,
+        true.grid, is_seam, real.ends, threads,
     )  # fmt: skip
     try:
         nodes, gently = place_freely(draft, _wanted_sizes(draft, real, options.growth, threads))

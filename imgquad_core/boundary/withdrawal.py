@@ -7,6 +7,7 @@ exactly their pixels' points: these never cross, so the loop ends whatever the p
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from imgquad_core.chains import any_of_chain, places_of
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.conflicts import CROSSING, FREE, SHARP, UNITS, find_conflicts, snapped
 from imgquad_core.model import Chains
+from imgquad_core.threads import LEAST, in_threads
 
 from .areas import mitres, restore_areas
 from .curves import Curves, Ends, arc_lengths, per_point, pin_ends
@@ -76,6 +78,12 @@ class Draft(NamedTuple):
     units: float = UNITS  #: steps of the grid on which coordinates are exact, a unit of length
     is_seam: Flags | None = None  #: (n_chains,) chains that others must not cross, and no more; None: there are none
     real_ends: Ends | None = None  #: the ends without these
+    threads: int = 1  #: how many share the strides
+
+    def marks_of(self, points: Floats, strides: Sequence[Strided], is_new: Flags, gently: bool) -> list[Bytes]:
+        """Mark the segments at each stride that are in conflict."""
+        threads = self.threads if len(points) > LEAST else 1
+        return in_threads(list(strides), lambda strided: self.marks(points, strided, is_new, gently), threads)
 
     def marks(self, points: Floats, strided: Strided, is_new: Flags, gently: bool) -> Bytes:
         """Mark the segments at a stride that are in conflict."""
@@ -123,8 +131,8 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         gently = attempt < patience.gentle
         nodes = _place(draft, size, at_least, exact, withdrawn)
         factor, pull = np.ones(len(size)), np.zeros(len(size))
-        for strided in (on_stride(nodes, 2), on_stride(nodes, 1)):
-            marks = draft.marks(nodes.points, strided, is_new, gently)
+        strides = on_stride(nodes, 2), on_stride(nodes, 1)
+        for strided, marks in zip(strides, draft.marks_of(nodes.points, strides, is_new, gently), strict=True):
             _mark_dense(marks, strided, curves.offsets, attempt >= patience.closer, factor, pull)
         if factor.min() == 1.0:
             return nodes, gently
@@ -222,17 +230,16 @@ def restore_areas_freely(
     bound = _area_bounds(draft.curves, nodes, room, max_shift)
     shift, tested = np.zeros(len(sides)), nodes.points
     had_conflicts = np.zeros(len(sides), bool)
-    both = [
-        (strided, _excused(draft, nodes, strided, gently)) for strided in (on_stride(nodes, 2), on_stride(nodes, 1))
-    ]
+    strides = on_stride(nodes, 2), on_stride(nodes, 1)
+    excused = _excused(draft, nodes, strides, gently)
     for attempt in range(_AREA_ROUNDS):
         points, shift = restore_areas(nodes.points, chains, areas, bound, shift)
         points = snapped(points, draft.units)
         has_moved = any_of_chain((points != tested).any(axis=1)[nodes.chain_points], placed.offsets)
         has_moved |= had_conflicts
         is_bad = np.zeros(len(points), bool)
-        for strided, is_excused in both:
-            marks = draft.marks(points, strided, has_moved, True)
+        marked = draft.marks_of(points, strides, has_moved, True)
+        for strided, marks, is_excused in zip(strides, marked, excused, strict=True):
             is_bad[strided.segments[marks > np.where(is_excused, CROSSING - 1, FREE)]] = True
         if not is_bad.any():
             return nodes._replace(points=points)
@@ -241,12 +248,12 @@ def restore_areas_freely(
     return nodes
 
 
-def _excused(draft: Draft, nodes: Nodes, strided: Strided, gently: bool) -> Flags:
+def _excused(draft: Draft, nodes: Nodes, strides: Sequence[Strided], gently: bool) -> list[Flags]:
     """Tell which segments are too close to others or at too sharp sectors before areas are restored."""
     if gently:
-        return np.zeros(len(strided.segments), bool)
+        return [np.zeros(len(strided.segments), bool) for strided in strides]
     all_chains = np.ones(len(draft.curves.ends), bool)
-    return np.asarray(draft.marks(nodes.points, strided, all_chains, True) > 0)
+    return [np.asarray(marks > 0) for marks in draft.marks_of(nodes.points, strides, all_chains, True)]
 
 
 def _widened(flags: Flags) -> Flags:
