@@ -464,8 +464,11 @@ function buttons() {
   addEventListener("pagehide", api.close);
 }
 
+// The page is seen before its view is made, which takes most of the time.
+const seen = () => new Promise((then) => requestAnimationFrame(() => setTimeout(then)));
+
 async function start() {
-  const asked = api.askOptions(); // under way while the view is made
+  const [asked] = await Promise.allSettled([api.askOptions(), seen()]);
   try {
     app.view = new View(at("canvas"));
     app.view.listeners.push(overlay);
@@ -481,7 +484,8 @@ async function start() {
   steps();
   history.replaceState(null, "", "/"); // the token has become a cookie
   try {
-    const { options, given, learns } = await asked;
+    if (asked.reason) throw asked.reason;
+    const { options, given, learns } = asked.value;
     Object.assign(app, { declared: options, learns });
     if (given) await open(await api.givenPicture(), given);
   } catch (error) {

@@ -283,9 +283,9 @@ export class View {
     this.listeners.forEach((listener) => listener());
   }
 
-  _use({ program, places }) {
-    const gl = this.gl, { x, y, scale } = this.camera;
-    gl.useProgram(program);
+  _use(made) {
+    const gl = this.gl, { x, y, scale } = this.camera, places = (made.places ??= placesOf(gl, made.program));
+    gl.useProgram(made.program);
     gl.uniform4f(places.camera, x, y, (2 * scale) / this.canvas.width, (2 * scale) / this.canvas.height);
     return places;
   }
@@ -370,6 +370,7 @@ export class View {
   }
 }
 
+// Begins to compile a program: to ask whether it is done would be to wait.
 function program(gl, { vertex, fragment }) {
   const made = gl.createProgram();
   for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
@@ -377,12 +378,17 @@ function program(gl, { vertex, fragment }) {
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
     gl.attachShader(made, shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
   }
   gl.linkProgram(made);
+  return { program: made, places: null };
+}
+
+// Where the values of a program go, by name.
+function placesOf(gl, made) {
+  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error([gl.getProgramInfoLog(made), ...gl.getAttachedShaders(made).map((shader) => gl.getShaderInfoLog(shader))].join("\n"));
   const n = gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS);
   const names = Array.from({ length: n }, (_, k) => gl.getActiveUniform(made, k).name);
-  return { program: made, places: Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(made, name)])) };
+  return Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(made, name)]));
 }
 
 // The two triangles of each of n quads.
