@@ -7,13 +7,12 @@ const WIDE = 4096; // texels in a row of a table
 export const LARGEST = 4096; // side of a picture that is shown, as in packing.py
 const VOID = [0, 0, 0, 0];
 
-// Lines are a table of four numbers each in a texture, fetched by the number of the vertex, six a line: instances would be
-// simpler, but without a graphics card each one costs as much as a drawing. Quads are four vertices, drawn block by block.
+// Lines and quads are four vertices each, drawn block by block; lines are a table of four numbers in a texture, fetched by
+// the number of the vertex: instances would be simpler, but without a graphics card each one costs as much as a drawing.
 const CAMERA = `#version 300 es
 precision highp float; precision highp int; precision highp sampler2D; precision highp usampler2D;
 uniform vec4 camera; // centre, and clip units a pixel of the picture
-vec4 seen(vec2 p) { return vec4((p - camera.xy) * vec2(camera.z, -camera.w), 0., 1.); }
-vec4 entry(sampler2D table, int k) { return texelFetch(table, ivec2(k % ${WIDE}, k / ${WIDE}), 0); }`;
+vec4 seen(vec2 p) { return vec4((p - camera.xy) * vec2(camera.z, -camera.w), 0., 1.); }`;
 const PICTURE = {
   vertex: `${CAMERA} uniform vec4 rect; out vec2 at;
     void main() { at = rect.xy + rect.zw * vec2(gl_VertexID & 1, gl_VertexID >> 1); gl_Position = seen(at); }`,
@@ -39,14 +38,14 @@ const PICTURE = {
     }`,
 };
 const LINES = {
-  vertex: `${CAMERA} uniform sampler2D table; uniform vec2 screen; uniform float width;
+  vertex: `${CAMERA} uniform sampler2D table; uniform vec2 screen; uniform float width; uniform int first;
     void main() {
-      vec4 ends = entry(table, gl_VertexID / 6);
-      int corner = gl_VertexID % 6;
+      int line = first + (gl_VertexID >> 2), corner = gl_VertexID & 3;
+      vec4 ends = texelFetch(table, ivec2(line % ${WIDE}, line / ${WIDE}), 0);
       vec2 a = seen(ends.xy).xy * screen, b = seen(ends.zw).xy * screen, along = b - a;
       along /= max(length(along), 1e-6);
       vec2 side = vec2(-along.y, along.x) * width;
-      bool far = corner == 1 || corner == 2 || corner == 4, up = corner == 2 || corner > 3;
+      bool far = corner == 1 || corner == 2, up = corner > 1;
       vec2 p = (far ? b + along * width * .5 : a - along * width * .5) + (up ? side : -side);
       gl_Position = vec4(p / screen, 0, 1);
     }`,
@@ -306,7 +305,11 @@ export class View {
     gl.uniform2f(places.screen, this.canvas.width / 2, this.canvas.height / 2);
     gl.uniform1f(places.width, width / 2);
     gl.uniform4f(places.ink, ...ink);
-    gl.drawArrays(gl.TRIANGLES, 0, 6 * n);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.halves);
+    for (let first = 0; first < n; first += BLOCK) {
+      gl.uniform1i(places.first, first);
+      gl.drawElements(gl.TRIANGLES, 6 * Math.min(BLOCK, n - first), gl.UNSIGNED_SHORT, 0);
+    }
   }
 
   _give(places, textures) {
