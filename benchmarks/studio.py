@@ -26,7 +26,8 @@ from support.studio import Studio, running_studio
 BARS = {
     "command to page": 1.5, "picture seen": 0.3, "classes": 5.0, "noise slider": 1.0, "smoothing": 2.0,
     "mesh there": 3.0, "mesh shown": 1.0, "frame, median ms": 17, "frame, p95 ms": 40, "redraw": 0.4,
-    "worst element": 0.5, "redraw, zoomed in": 0.03, "cancel": 0.5, "cancel: worker dead": 0.2, "ping, median ms": 10, "ping, most ms": 100, "MB of the server": 80,
+    "worst element": 0.5, "redraw, zoomed in": 0.03, "cancel": 0.5, "cancel: worker dead": 0.2,
+    "ping, median ms": 10, "ping, most ms": 100, "MB of the server": 80,
     "MB of the fork server": 250, "MB of the worker, peak": 400, "MB of the page's heap": 50,
 }  # fmt: skip
 
