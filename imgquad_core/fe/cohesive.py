@@ -53,7 +53,8 @@ def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all
     Raises
     ------
     InputError
-        No such material, the two do not touch, or the mesh was split or extruded before.
+        No such material, the two do not touch, the mesh was split or extruded before, or sides of a periodic cell meet
+        nowhere but in nodes that are split.
     """
     if mesh.dimension == 3 or len(mesh.cohesive):
         raise InputError(
@@ -69,7 +70,7 @@ def split_interfaces(mesh: FEMesh, pairs: str | Iterable[tuple[str, str]] = "all
         point_kind=mesh.point_kind[origin],
         chain_offsets=np.zeros(1, np.int64),
         chain_points=np.empty(0, np.int64),
-        periodic={d: _paired_copies(mesh, pairs, group, cells) for d, pairs in mesh.periodic.items()},
+        periodic=_periodic_copies(mesh, group, cells),
     )
     below, above = (halves.side_nodes(np.stack([h // 4, h % 4], axis=1)) for h in (lower, upper))
     # each side runs counter-clockwise around its own element, so the two run against each other
@@ -212,6 +213,17 @@ def _corners_across(mesh: FEMesh, pairs: Ints) -> Ints:
     facing = key[order][at] == wanted
     near, far = near[facing], outer[order][at][facing]
     return np.stack([np.concatenate([near, next_corner[near]]), np.concatenate([next_corner[far], far])])
+
+
+def _periodic_copies(mesh: FEMesh, group: Ints, cells: Ints) -> dict[str, Ints]:
+    copies = {d: _paired_copies(mesh, pairs, group, cells) for d, pairs in mesh.periodic.items()}
+    for direction, pairs in copies.items():
+        if not len(pairs):
+            raise InputError(
+                f"periodic: in {direction} both sides meet in single nodes only, which interfaces part: "
+                "nothing can be tied; drop less"
+            )
+    return copies
 
 
 def _paired_copies(mesh: FEMesh, pairs: Ints, group: Ints, cells: Ints) -> Ints:

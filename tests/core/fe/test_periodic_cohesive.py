@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from imgquad_core import MeshOptions, mesh_image
+from imgquad_core.errors import InputError
 from imgquad_core.fe import ElementOptions, make_elements
 from imgquad_core.fe.cohesive import closed_ends
 from imgquad_core.writers.abaqus.equations import _ties
@@ -30,6 +31,14 @@ def test_any_picture_does_with_its_interfaces_closed_where_they_do_not_go_on() -
     assert_tied(made)
     assert_whole(made)
     assert closed_ends(made) > 0
+
+
+def test_sides_that_meet_in_a_node_that_is_split_are_refused() -> None:
+    labels = np.array([[0, 0, 3, 1], [0, 0, 3, 1], [2, 2, 0, 0], [2, 2, 0, 0]], np.int32)  # 2 ends where 1 begins
+    mesh = mesh_image(labels, MeshOptions(periodic="x", drop=(0,)))
+    assert len(make_elements(mesh, ElementOptions(periodic="x")).periodic["x"]) == 1
+    with pytest.raises(InputError, match="meet in single nodes only"):
+        make_elements(mesh, ElementOptions(cohesive="all", periodic="x"))
 
 
 def test_an_interface_across_the_seam_is_split_on_both_sides() -> None:
