@@ -49,16 +49,25 @@ def _offsets_of(counts: Ints) -> Ints:
 def lay_seams(points: Floats, curves: Curves, is_seam: Flags, room: float) -> None:
     """Put the points of seams between their ends, in place: on a straight line, but `room` away from boundaries."""
     if is_seam.any():
-        _straighten(points, curves, is_seam)
+        _straighten(points, curves, is_seam, int(4 * room))
         _bend(points, curves, is_seam, room)
 
 
-def _straighten(points: Floats, curves: Curves, is_seam: Flags) -> None:
-    at = np.flatnonzero(per_point(curves, is_seam))
-    c = np.searchsorted(curves.offsets, at, side="right") - 1
-    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
-    share = (curves.arc[at] / np.maximum(curves.arc[last], 1e-9))[:, None]
-    points[at] = points[first] + share * (points[last] - points[first])
+def _straighten(points: Floats, curves: Curves, is_seam: Flags, reach: int) -> None:
+    """Average the pixel boundary of seams over so many points on each side, fewer near their ends: twice."""
+    for c in np.flatnonzero(is_seam):
+        part = slice(curves.offsets[c], curves.offsets[c + 1])
+        xy = np.concatenate([points[part][:1], curves.raw[part][1:-1], points[part][-1:]])
+        for _ in range(2):
+            xy = _averaged(xy, reach)
+        points[part] = xy
+
+
+def _averaged(xy: Floats, reach: int) -> Floats:
+    k, n = np.arange(len(xy)), len(xy)
+    half = np.minimum(np.minimum(k, n - 1 - k), reach)
+    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(xy, axis=0)])
+    return np.asarray((sums[k + half + 1] - sums[k - half]) / (2 * half + 1)[:, None])
 
 
 def _bend(points: Floats, curves: Curves, is_seam: Flags, room: float) -> None:

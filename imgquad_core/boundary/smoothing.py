@@ -102,6 +102,7 @@ def smooth_chains(
     curves, ends = curves_of(*chains)
     curves, is_corner = find_corners(curves, threads=threads)
     is_seam = np.zeros(len(which), bool) if seams is None else seams[which]
+    is_corner &= ~per_point(curves, is_seam)
     real = without_seams(curves, ends, is_seam)
     room = np.zeros(len(curves.raw))
     room[real.kept] = _room(real.curves, is_corner[real.kept], options.max_shift, threads)

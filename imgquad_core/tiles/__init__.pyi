@@ -1,8 +1,8 @@
 from .bands import ROUNDS, groups_of
 from .grid import Grid, grid_of
+from .job import Job
 from .rules import Rules, legend_as_json, load_rules, rules_of, save_rules
 from .sources import Source, source_of, stamp_of
-from .tasks import Job
 
 __all__ = [
     "ROUNDS",

@@ -1,6 +1,6 @@
 r"""Places where boundaries cross seams: one node, not two with a short chain between them.
 
-Where a boundary runs along the line of tiles from one side of it to the other, pixels make two nodes of that::
+Where the way along which tiles part crosses a boundary, it follows that for some pixels, which make two nodes::
 
         |                         |                  |   seam, straight down
     ____a                         |                      boundary from left to right
@@ -20,10 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Floats, Ints
-from imgquad_core.geometry.conflicts import snapped
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
-
-STEP = 0.5  #: px between points on the way to a node, at most
 
 
 class Crossed(NamedTuple):
@@ -34,7 +31,7 @@ class Crossed(NamedTuple):
 
 
 def join_crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: float) -> Crossed:
-    """Join the two nodes at each end of short chains along a line of tiles.
+    """Join the two nodes at each end of short chains along which tiles part.
 
     Parameters
     ----------
@@ -53,20 +50,25 @@ def join_crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: flo
         Of two nodes the upper, or left, one keeps its id, at its new place.
     """
     chains = [raw.chain_points[a:b] for a, b in zip(raw.chain_offsets[:-1], raw.chain_offsets[1:], strict=True)]
-    points, gone, into = raw.points.copy(), np.zeros(len(chains), bool), {}
+    points, gone, into, tail = raw.points.copy(), np.zeros(len(chains), bool), {}, {}
     for c in _crossings(raw, regions, owners, longest).tolist():
-        a, b = sorted((int(chains[c][0]), int(chains[c][-1])), key=lambda p: (-raw.points[p, 1], raw.points[p, 0]))
-        points[[a, b]] = 0.5 * (raw.points[a] + raw.points[b])
-        gone[c], into[a], into[b] = True, a, a
+        way, half = raw.points[chains[c]], len(chains[c]) // 2
+        first, last = int(chains[c][0]), int(chains[c][-1])
+        a = min(first, last, key=lambda p: (-raw.points[p, 1], raw.points[p, 0]))
+        points[[first, last]] = way[half]
+        gone[c], into[first], into[last] = True, a, a
+        tail[first], tail[last] = way[:half], way[:half:-1]
     which = np.flatnonzero(~gone)
     parts, ids, n = [points], [], len(points)
     for chain in (chains[c] for c in which.tolist()):
-        ends = [into.get(int(p), int(p)) for p in chain[[0, -1]]]
-        if into.keys() & {int(chain[0]), int(chain[-1])}:
-            inner = _inner(raw.points[chain], points[ends])
-            parts.append(inner)
-            chain = np.concatenate([ends[:1], n + np.arange(len(inner)), ends[1:]]).astype(np.int64)
-            n += len(inner)
+        first, last = int(chain[0]), int(chain[-1])
+        if into.keys() & {first, last}:
+            none = points[:0]
+            inner = [tail.get(first, none)[::-1], raw.points[chain[1:-1]], tail.get(last, none)]
+            parts += inner
+            new = n + np.arange(sum(map(len, inner)))
+            chain = np.array([into.get(first, first), *new, into.get(last, last)])
+            n += len(new)
         ids.append(chain)
     more = np.full(n - len(points), PointKind.FREE, np.uint8)
     joined = replace(
@@ -81,7 +83,7 @@ def join_crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: flo
 
 
 def _crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: float) -> Ints:
-    """Find the short chains along a line of tiles, with one seam at each of their two ends."""
+    """Find the short chains between two tiles, with one seam at each of their two ends."""
     first, last = raw.chain_points[raw.chain_offsets[:-1]], raw.chain_points[raw.chain_offsets[1:] - 1]
     n, is_seam = len(raw.points), (regions[:, 0] == regions[:, 1]) & (owners[:, 0] != owners[:, 1])
     of_seam = np.full(n, -1)
@@ -95,23 +97,17 @@ def _crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: float) 
         np.minimum.at(low, ends, owners.min(axis=1))
         np.maximum.at(high, ends, owners.max(axis=1))
     plain = (raw.point_kind == PointKind.JUNCTION) & (degree == 3) & (seams == 1) & ~on_border
-    way = np.abs(raw.points[last] - raw.points[first])
+    length = np.add.reduceat(np.append(_steps(raw), 0.0), raw.chain_offsets[:-1])
     found = ~is_seam & (owners[:, 0] != owners[:, 1]) & plain[first] & plain[last] & (first != last)
-    found &= (way.min(axis=1) == 0.0) & (way.max(axis=1) <= longest)
-    found &= of_seam[first] != of_seam[last]  # else the boundary turns back from the line
+    found &= length <= longest
+    found &= of_seam[first] != of_seam[last]  # else the boundary turns back from where tiles part
     found &= (low[first] == low[last]) & (high[first] == high[last])
     of_chain = owners.min(axis=1), owners.max(axis=1)
     return np.flatnonzero(found & (low[first] == of_chain[0]) & (high[first] == of_chain[1]))
 
 
-def _inner(xy: Floats, ends: Floats) -> Floats:
-    """Return the points inside a chain, with a straight way to each end that was moved."""
-    before = _way(xy[1], ends[0])[::-1] if (xy[0] != ends[0]).any() else xy[:0]
-    after = _way(xy[-2], ends[1]) if (xy[-1] != ends[1]).any() else xy[:0]
-    return np.concatenate([before, xy[1:-1], after])
-
-
-def _way(start: Floats, stop: Floats) -> Floats:
-    """Return the points between two."""
-    n = max(int(np.ceil(np.hypot(*(stop - start)) / STEP)), 1)
-    return snapped(start + np.arange(1, n)[:, None] / n * (stop - start))
+def _steps(raw: BoundaryGraph) -> Floats:
+    """Return how far it is from each place of the chains to the next one: 0 at their ends."""
+    steps = np.hypot(*np.diff(raw.points[raw.chain_points], axis=0).T)
+    steps[raw.chain_offsets[1:-1] - 1] = 0.0
+    return np.asarray(steps)

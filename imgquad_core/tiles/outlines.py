@@ -25,7 +25,7 @@ from .crossings import join_crossings
 from .grid import Box
 from .regions import Keys, Regions
 
-LONGEST = 16.0  #: px along a line of tiles that a boundary takes to cross it, at one node
+LONGEST = 16.0  #: px between two tiles that a boundary takes to cross their seam, at one node
 NOBODY = np.iinfo(np.int64).max  #: owner of what is not meshed
 
 

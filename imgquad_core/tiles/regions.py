@@ -142,7 +142,7 @@ def joined_regions(grid: Grid, tiles: list[TileRegions]) -> Regions:
     row, column = first // grid.shape[1] // grid.tile, first % grid.shape[1] // grid.tile
     own = np.concatenate([tile.pixels for tile in tiles]) > 0
     owner, is_cut = row * grid.across + column, is_large & in_tiles
-    reach = np.array([grid.box(t) for t in range(grid.n_tiles)])
+    reach = np.array([grid.box(t, grid.reach) for t in range(grid.n_tiles)])
     np.minimum.at(reach[:, :2], owner[~is_cut], low[~is_cut])
     np.maximum.at(reach[:, 2:], owner[~is_cut], high[~is_cut])
     return Regions(label[order], pixels[order], owner, is_cut, np.where(own, number[of], -1), offsets, reach)
@@ -177,11 +177,13 @@ class Keys(NamedTuple):
 
 
 class Part(NamedTuple):
-    """What a window has of one tile."""
+    """What a window has of one tile, or which of that a route has given to another one."""
 
     tile: int
     place: tuple[slice, slice]  #: in the window
     ids: Labels  #: as the tile numbers its regions, -1 void
+    owner: int  #: tile that pieces of cut regions are of
+    where: Flags | None = None  #: the pixels that count, None for all
 
 
 def keys_of(shape: tuple[int, int], parts: list[Part], grid: Grid, regions: Regions) -> Keys:
@@ -192,7 +194,7 @@ def keys_of(shape: tuple[int, int], parts: list[Part], grid: Grid, regions: Regi
     shape : tuple of int
         (n_rows, n_cols) of the window.
     parts : list of Part
-        What it is made of.
+        What it is made of: of several that have a pixel, the last one counts.
     grid, regions
         Of the picture.
 
@@ -210,13 +212,14 @@ def keys_of(shape: tuple[int, int], parts: list[Part], grid: Grid, regions: Regi
     pixels = np.empty(shape, np.int32)
     for part, code in zip(parts, codes, strict=True):
         at = np.where(code >= 0, np.searchsorted(faces, code), len(faces))
-        pixels[part.place] = key[at][part.ids]
+        np.copyto(pixels[part.place], key[at][part.ids], where=True if part.where is None else part.where)
     return Keys(pixels, region[order], tile[order])
 
 
 def _codes(part: Part, grid: Grid, regions: Regions) -> Ints:
     """Return for each number of a tile's regions, and at last for void, region and owner in one; -1 if not there."""
     number = regions.number[regions.offsets[part.tile] : regions.offsets[part.tile + 1]]
-    there = np.bincount(part.ids.ravel() + 1, minlength=len(number) + 1)[1:] > 0
-    owner = np.where(regions.is_cut[number], part.tile, regions.owner[number])
+    ids = part.ids.ravel() if part.where is None else part.ids[part.where]
+    there = np.bincount(ids + 1, minlength=len(number) + 1)[1:] > 0
+    owner = np.where(regions.is_cut[number], part.owner, regions.owner[number])
     return np.append(np.where(there, number * grid.n_tiles + owner, -1), -1)

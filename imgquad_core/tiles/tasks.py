@@ -5,6 +5,7 @@
     rules      once          the legend, the limits of noise, the width of data points
     labels     tile          materials without noise
     regions    tile          its regions, and once more: those of the picture, whole or cut
+    route      tile          where it and the next ones part the latter
     outlines   tile          smoothed chains around its faces
     mesh       tile          quads; again where shared edges are to be halved, or a piece is on too wide a stride
     strides    once          after the first time: the widest that no piece of a cut region is poor on
@@ -22,7 +23,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -49,51 +49,22 @@ from imgquad_core.whole_files import replacing
 
 from .bands import ROUNDS, cleaned_band, groups_of, seam_places
 from .elements import COLUMNS, Mapped, Ring, as_arrays, joined_sets, named_elements, ring_of, tile_sets
-from .files import load_arrays, path_of, save_arrays, save_plane
+from .files import load_arrays, save_arrays, save_plane
 from .grid import Box, Grid
+from .job import Job
 from .meshes import Patch, TileMesh, mesh_outlines, open_nodes, patched
 from .numbering import Own, Rim, first_numbers, numbers_of, owned
 from .outlines import Outlines, outlines_of, settled
-from .regions import Part, Regions, TileRegions, joined_regions, keys_of, tile_regions
-from .rules import Rules, load_rules, rules_of, save_rules
-from .sources import Source, sample_boxes
+from .regions import TileRegions, joined_regions, keys_of, tile_regions
+from .routes import Ends, side_of_route
+from .rules import rules_of, save_rules
+from .sources import sample_boxes
+from .windows import labels_in, numbers_in, parts_with_routes, regions_of
 
 NOISE_REACH = 64  #: px around a tile that noise removal sees, beside the shortest length that stays
 CORNER_REACH = 5  #: data points around a tile that tell what is joined over corners
 ATTEMPTS = 3  #: at a tile: the later ones only where edges that it shares are to be halved, or strides are too wide
 BINS = 1000  #: of scaled Jacobians from 0 to 1
-
-
-@dataclass(frozen=True)
-class Job:
-    """A picture in tiles: what is done to what, and where.
-
-    Parameters
-    ----------
-    folder : str
-        What steps leave for each other.
-    source : Source
-        The picture.
-    grid : Grid
-        Its tiles.
-    options : MeshOptions
-        As asked.
-    """
-
-    folder: str
-    source: Source
-    grid: Grid
-    options: MeshOptions
-
-    def path(self, kind: str, *places: int) -> Path:
-        """Return where a kind of arrays of a tile is kept."""
-        return path_of(Path(self.folder), kind, *places)
-
-    def rules(self) -> Rules:
-        """Return what holds for all tiles; it must be decided."""
-        found = load_rules(Path(self.folder) / "rules.json", "", self.options)
-        assert found is not None
-        return found
 
 
 # ------------------------------------------------------------------------------------------------------- labels
@@ -154,27 +125,6 @@ def _counts(values: Labels, numbers: Labels) -> Ints:
     return np.bincount(np.searchsorted(numbers, values[values != VOID]), minlength=len(numbers))
 
 
-def _parts_of(job: Job, kind: str, box: Box) -> list[Part]:
-    """Return what tiles have left of a window."""
-    found = []
-    for t in job.grid.tiles_in(box):
-        left, upper, right, lower = job.grid.box(t)
-        first, top = max(left, box[0]), max(upper, box[1])
-        last, end = min(right, box[2]), min(lower, box[3])
-        plane = np.load(job.path(kind, t).with_suffix(".npy"), mmap_mode="r")
-        place = slice(top - box[1], end - box[1]), slice(first - box[0], last - box[0])
-        found.append(Part(t, place, plane[top - upper : end - upper, first - left : last - left]))
-    return found
-
-
-def _labels_of(job: Job, box: Box) -> Labels:
-    """Put the labels of a window together."""
-    whole = np.empty((box[3] - box[1], box[2] - box[0]), np.int32)
-    for part in _parts_of(job, "labels", box):
-        whole[part.place] = part.ids
-    return whole
-
-
 # ------------------------------------------------------------------------------------------------------ regions
 
 
@@ -187,7 +137,7 @@ def regions(job: Job, t: int, *_: Any) -> None:
     extended = job.grid.clipped((box[0], box[1], box[2] + 1, box[3] + 1))
     reach = int(CORNER_REACH * max(rules.step)) + 1
     window = job.grid.clipped((extended[0] - reach, extended[1] - reach, extended[2] + reach, extended[3] + reach))
-    found = tile_regions(_labels_of(job, window), window, box, extended, job.grid.shape[1], rules.extraction)
+    found = tile_regions(labels_in(job, window), window, box, extended, job.grid.shape[1], rules.extraction)
     save_plane(path, found.ids)
     edges = {"above": found.ids[0], "beside": found.ids[:, 0]}
     save_arrays(job.path("regions", t), **{k: v for k, v in found._asdict().items() if k != "ids"}, **edges)
@@ -211,8 +161,21 @@ def _table(job: Job, t: int) -> TileRegions:
     return TileRegions(edges, **found)
 
 
-def _regions_of(job: Job) -> Regions:
-    return Regions(**load_arrays(job.path("regions")))
+def route(job: Job, t: int, *_: Any) -> None:
+    """Find where a tile and those below and beside it part regions that are cut."""
+    path = job.path("route", t)
+    if path.exists():
+        return
+    grid, every, found = job.grid, regions_of(job), {}
+    for axis in (0, 1):
+        box = grid.corridor(t, axis)
+        if box is not None:
+            numbers = numbers_in(job, box, every)
+            line = grid.box(grid.next_to(t, axis))[1 - axis] - box[1 - axis]
+            ends, size = Ends(*grid.meets_others(t, 1 - axis)), largest_size(job.options)
+            beyond = side_of_route(numbers.T if axis == 0 else numbers, every.is_cut, line, ends, size)
+            found[f"beyond-{axis}"] = beyond.T if axis == 0 else beyond
+    save_arrays(path, **found)
 
 
 # ---------------------------------------------------------------------------------------------- chains and quads
@@ -223,9 +186,10 @@ def outlines(job: Job, t: int, *_: Any) -> None:
     path = job.path("outlines", t)
     if path.exists():
         return
-    rules, grid, every = job.rules(), job.grid, _regions_of(job)
+    rules, grid, every = job.rules(), job.grid, regions_of(job)
     window = grid.window(every.box_of(t))
-    keys = keys_of((window[3] - window[1], window[2] - window[0]), _parts_of(job, "ids", window), grid, every)
+    parts = parts_with_routes(job, window)
+    keys = keys_of((window[3] - window[1], window[2] - window[0]), parts, grid, every)
     if not (keys.tile == t).any():
         save_arrays(path, **_no_outlines()._asdict())
         return
@@ -272,7 +236,7 @@ def mesh(job: Job, t: int, attempt: int, *_: Any) -> None:
     rules = job.rules()
     found = settled(t, mine, lambda other: _outlines_of(job, other), asked[1])
     how = rules.options.meshing(rules.legend.materials)
-    made = mesh_outlines(found, job.grid.shape[0], how, widest, _regions_of(job).is_cut[mine.region])
+    made = mesh_outlines(found, job.grid.shape[0], how, widest, regions_of(job).is_cut[mine.region])
     if made.mesh is not None:
         save_arrays(job.path("mesh", t, attempt), **made.mesh._asdict())
     elif attempt == ATTEMPTS - 1 or not mine.shared.any():
@@ -296,7 +260,7 @@ def strides(job: Job, *_: Any) -> None:
     path = job.path("strides")
     if path.exists():
         return
-    is_cut = _regions_of(job).is_cut
+    is_cut = regions_of(job).is_cut
     found = np.full(len(is_cut), WIDEST)
     for t in range(job.grid.n_tiles):
         made = load_arrays(job.path("wish", t, 0))
@@ -360,7 +324,7 @@ def finish(job: Job, t: int, *_: Any) -> dict[str, Any]:
     report = Path(job.folder) / f"final-{t}.json"
     if not (path.exists() and report.exists()):
         made = _state(job, t, len(ROUNDS))
-        label = _regions_of(job).label[made.region]
+        label = regions_of(job).label[made.region]
         rim = open_nodes(made)
         areas = quad_areas(made.points, made.quads) if len(made.quads) else np.empty(0)
         ids, at = np.unique(made.region, return_inverse=True)

@@ -62,7 +62,7 @@ class TiledMesh:
     def box(self, left: int, upper: int, right: int, lower: int) -> QuadMesh:
         """Return the quads whose middle is in a part of the picture: bounds in pixels from its upper left corner."""
         grid = self.job.grid
-        reach = grid.clipped((left - grid.keep, upper - grid.keep, right + grid.keep, lower + grid.keep))
+        reach = grid.clipped((left, upper, right, lower), max(grid.keep, grid.reach))
         parts = []
         for t in grid.tiles_in(reach):
             part, label = _read_tile(self.job, t)
@@ -261,7 +261,9 @@ def _steps(job: Job, stored: Any, form: str) -> Iterator[Step]:
         yield Step(f"regions-{t}", Guarded(work.regions), (job, t, after("labels", grid.around(t))))
     yield Step("join", work.join, (job, after("regions", every)))
     for t in every:
-        yield Step(f"outlines-{t}", Guarded(work.outlines), (job, t, Result("join")))
+        yield Step(f"route-{t}", Guarded(work.route), (job, t, Result("join")))
+    for t in every:
+        yield Step(f"outlines-{t}", Guarded(work.outlines), (job, t, after("route", grid.seen_by(t))))
     for t in every:
         yield Step(f"mesh-{t}-0", Guarded(work.mesh), (job, t, 0, after("outlines", grid.around(t))))
     yield Step("strides", work.strides, (job, [Result(f"mesh-{t}-0") for t in every]))

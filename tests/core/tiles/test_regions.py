@@ -33,7 +33,7 @@ def keys_in(box: tuple[int, int, int, int], grid: Grid, found: Regions, tiles: l
         left, upper, right, lower = grid.box(t)
         first, top, last, end = max(left, box[0]), max(upper, box[1]), min(right, box[2]), min(lower, box[3])
         place = np.s_[top - box[1] : end - box[1], first - box[0] : last - box[0]]
-        parts.append(Part(t, place, tiles[t].ids[top - upper : end - upper, first - left : last - left]))
+        parts.append(Part(t, place, tiles[t].ids[top - upper : end - upper, first - left : last - left], t))
     return keys_of((box[3] - box[1], box[2] - box[0]), parts, grid, found)
 
 
