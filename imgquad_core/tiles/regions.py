@@ -28,16 +28,24 @@ STRIP = 256  #: rows that are looked at together
 _FAR = np.iinfo(np.int64).max
 
 
-class TileRegions(NamedTuple):
-    """Regions as one tile sees them, numbered by itself."""
+class Table(NamedTuple):
+    """The regions that a tile sees, without its plane."""
 
-    ids: Labels  #: (n_rows, n_cols) of its pixels, -1 void
-    label: Labels  #: (n,) material of each
-    pixels: Ints  #: (n,) of the tile's own pixels
-    first: Ints  #: (n,) least number of such a pixel in the picture, row by row
+    above: Labels  #: ids in the first row
+    beside: Labels  #: ids in the first column
+    label: Labels  #: of each region
+    pixels: Ints  #: of each region, those of the tile itself
+    first: Ints  #: place of the first of them in the picture, counted row by row
     box: Ints  #: (n, 4) left, upper, right, lower bound of these
     below: Labels  #: ids in the row below the tile, one pixel more if there is a tile to the right
     right: Labels  #: ids in the column to the right
+
+
+class TileRegions(NamedTuple):
+    """The regions that a tile sees."""
+
+    ids: Labels  #: (n_rows, n_cols) of the tile itself, -1 void
+    table: Table
 
 
 class Regions(NamedTuple):
@@ -88,7 +96,7 @@ def tile_regions(
         _measure(own[start : start + STRIP], tile[0], tile[1] + start, n_cols, found)
     below = ids[height] if ids.shape[0] > height else np.empty(0, np.int32)
     right = ids[:height, width] if ids.shape[1] > width else np.empty(0, np.int32)
-    return TileRegions(own, label, found.pixels, found.first, found.box, below, right)
+    return TileRegions(own, Table(own[0], own[:, 0], label, *found, below, right))
 
 
 class _Measured(NamedTuple):
@@ -108,15 +116,15 @@ def _measure(ids: Labels, left: int, upper: int, n_cols: int, found: _Measured) 
         np.maximum.at(found.box[:, k + 2], which, values + 1)
 
 
-def joined_regions(grid: Grid, tiles: list[TileRegions]) -> Regions:
+def joined_regions(grid: Grid, tiles: list[Table]) -> Regions:
     """Put together what tiles see of the regions.
 
     Parameters
     ----------
     grid : Grid
         The tiles.
-    tiles : list of TileRegions
-        In their order; of `ids` only the first row and the first column are looked at.
+    tiles : list of Table
+        In their order.
     """
     offsets = np.concatenate([[0], np.cumsum([len(tile.label) for tile in tiles])]).astype(np.int64)
     pairs = [_shared(grid, t, tiles, offsets) for t in range(grid.n_tiles)]
@@ -148,7 +156,7 @@ def joined_regions(grid: Grid, tiles: list[TileRegions]) -> Regions:
     return Regions(label[order], pixels[order], owner, is_cut, np.where(own, number[of], -1), offsets, reach)
 
 
-def _shared(grid: Grid, t: int, tiles: list[TileRegions], offsets: Ints) -> NDArray[np.int64]:
+def _shared(grid: Grid, t: int, tiles: list[Table], offsets: Ints) -> NDArray[np.int64]:
     """Return pairs of numbers, in one row of all tiles' regions, that stand for the same pixel."""
     row, column = grid.place(t)
     found = [np.empty((2, 0), np.int64)]
@@ -158,13 +166,13 @@ def _shared(grid: Grid, t: int, tiles: list[TileRegions], offsets: Ints) -> NDAr
         pairs = np.stack([mine[solid] + offsets[t], theirs[solid] + offsets[other]])
         found.append(np.unique(pairs, axis=1))
 
-    width = tiles[t].ids.shape[1]
+    width = len(tiles[t].above)
     if row + 1 < grid.down:
-        add(tiles[t].below[:width], t + grid.across, tiles[t + grid.across].ids[0])
+        add(tiles[t].below[:width], t + grid.across, tiles[t + grid.across].above)
         if column + 1 < grid.across:
-            add(tiles[t].below[width:], t + grid.across + 1, tiles[t + grid.across + 1].ids[0, :1])
+            add(tiles[t].below[width:], t + grid.across + 1, tiles[t + grid.across + 1].above[:1])
     if column + 1 < grid.across:
-        add(tiles[t].right, t + 1, tiles[t + 1].ids[:, 0])
+        add(tiles[t].right, t + 1, tiles[t + 1].beside)
     return np.concatenate(found, axis=1)
 
 

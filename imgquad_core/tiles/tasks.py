@@ -55,7 +55,7 @@ from .job import Job
 from .meshes import Patch, TileMesh, mesh_outlines, open_nodes, patched
 from .numbering import Own, Rim, first_numbers, numbers_of, owned
 from .outlines import Outlines, outlines_of, settled
-from .regions import TileRegions, joined_regions, keys_of, tile_regions
+from .regions import Table, joined_regions, keys_of, tile_regions
 from .routes import Ends, side_of_route
 from .rules import rules_of, save_rules
 from .sources import sample_boxes
@@ -139,8 +139,7 @@ def regions(job: Job, t: int, *_: Any) -> None:
     window = job.grid.clipped((extended[0] - reach, extended[1] - reach, extended[2] + reach, extended[3] + reach))
     found = tile_regions(labels_in(job, window), window, box, extended, job.grid.shape[1], rules.extraction)
     save_plane(path, found.ids)
-    edges = {"above": found.ids[0], "beside": found.ids[:, 0]}
-    save_arrays(job.path("regions", t), **{k: v for k, v in found._asdict().items() if k != "ids"}, **edges)
+    save_arrays(job.path("regions", t), **found.table._asdict())
 
 
 def join(job: Job, *_: Any) -> None:
@@ -148,17 +147,8 @@ def join(job: Job, *_: Any) -> None:
     path = job.path("regions")
     if path.exists():
         return
-    tiles = [_table(job, t) for t in range(job.grid.n_tiles)]
+    tiles = [Table(**load_arrays(job.path("regions", t))) for t in range(job.grid.n_tiles)]
     save_arrays(path, **joined_regions(job.grid, tiles)._asdict())
-
-
-def _table(job: Job, t: int) -> TileRegions:
-    """Return the regions of a tile without its pixels, but for the first row and column."""
-    found = load_arrays(job.path("regions", t))
-    above, beside = found.pop("above"), found.pop("beside")
-    edges = np.full((len(beside), len(above)), -1, np.int32)
-    edges[0], edges[:, 0] = above, beside
-    return TileRegions(edges, **found)
 
 
 def route(job: Job, t: int, *_: Any) -> None:

@@ -24,7 +24,7 @@ def regions_by_tiles(labels: Labels, grid: Grid) -> tuple[Regions, list[TileRegi
         window = grid.clipped((extended[0] - 4, extended[1] - 4, extended[2] + 4, extended[3] + 4))
         part = labels[window[1] : window[3], window[0] : window[2]]
         tiles.append(tile_regions(part, window, box, extended, labels.shape[1], OPTIONS))
-    return joined_regions(grid, tiles), tiles
+    return joined_regions(grid, [tile.table for tile in tiles]), tiles
 
 
 def keys_in(box: tuple[int, int, int, int], grid: Grid, found: Regions, tiles: list[TileRegions]) -> Keys:
