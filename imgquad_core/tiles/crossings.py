@@ -14,13 +14,17 @@ hangs on the pixels there alone, so all tiles that see the place join it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Floats, Ints
+from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.geometry.conflicts import snapped
 from imgquad_core.model import VOID, BoundaryGraph, PointKind
+
+GAP = 0.25  #: px between a seam and the pixel boundary that it follows to the crossing
 
 
 class Crossed(NamedTuple):
@@ -50,21 +54,25 @@ def join_crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: flo
         Of two nodes the upper, or left, one keeps its id, at its new place.
     """
     chains = [raw.chain_points[a:b] for a, b in zip(raw.chain_offsets[:-1], raw.chain_offsets[1:], strict=True)]
+    is_seam = (regions[:, 0] == regions[:, 1]) & (owners[:, 0] != owners[:, 1])
     points, gone, into, tail = raw.points.copy(), np.zeros(len(chains), bool), {}, {}
-    for c in _crossings(raw, regions, owners, longest).tolist():
+    for c, left_first in _crossings(raw, regions, owners, is_seam, longest):
         way, half = raw.points[chains[c]], len(chains[c]) // 2
         first, last = int(chains[c][0]), int(chains[c][-1])
         a = min(first, last, key=lambda p: (-raw.points[p, 1], raw.points[p, 0]))
         points[[first, last]] = way[half]
         gone[c], into[first], into[last] = True, a, a
-        tail[first], tail[last] = way[:half], way[:half:-1]
+        tail[first, False], tail[last, False] = way[:half], way[:half:-1]
+        tail[first, True] = _beside(way, left_first)[: max(half - 1, 0)]
+        tail[last, True] = _beside(way, not left_first)[: half - 1 : -1]
     which = np.flatnonzero(~gone)
     parts, ids, n = [points], [], len(points)
-    for chain in (chains[c] for c in which.tolist()):
+    for c in which.tolist():
+        chain, seam = chains[c], bool(is_seam[c])
         first, last = int(chain[0]), int(chain[-1])
         if into.keys() & {first, last}:
             none = points[:0]
-            inner = [tail.get(first, none)[::-1], raw.points[chain[1:-1]], tail.get(last, none)]
+            inner = [tail.get((first, seam), none)[::-1], raw.points[chain[1:-1]], tail.get((last, seam), none)]
             parts += inner
             new = n + np.arange(sum(map(len, inner)))
             chain = np.array([into.get(first, first), *new, into.get(last, last)])
@@ -82,10 +90,12 @@ def join_crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: flo
     return Crossed(joined, which)
 
 
-def _crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: float) -> Ints:
-    """Find the short chains between two tiles, with one seam at each of their two ends."""
+def _crossings(
+    raw: BoundaryGraph, regions: Ints, owners: Ints, is_seam: Flags, longest: float
+) -> Iterator[tuple[int, bool]]:
+    """Give short chains between two tiles with a seam at each end; tell whether the first one is on the left."""
     first, last = raw.chain_points[raw.chain_offsets[:-1]], raw.chain_points[raw.chain_offsets[1:] - 1]
-    n, is_seam = len(raw.points), (regions[:, 0] == regions[:, 1]) & (owners[:, 0] != owners[:, 1])
+    n = len(raw.points)
     of_seam = np.full(n, -1)
     of_seam[first[is_seam]] = of_seam[last[is_seam]] = regions[is_seam, 0]
     degree, seams = (np.bincount(np.append(first[of], last[of]), minlength=n) for of in (slice(None), is_seam))
@@ -103,7 +113,15 @@ def _crossings(raw: BoundaryGraph, regions: Ints, owners: Ints, longest: float) 
     found &= of_seam[first] != of_seam[last]  # else the boundary turns back from where tiles part
     found &= (low[first] == low[last]) & (high[first] == high[last])
     of_chain = owners.min(axis=1), owners.max(axis=1)
-    return np.flatnonzero(found & (low[first] == of_chain[0]) & (high[first] == of_chain[1]))
+    for c in np.flatnonzero(found & (low[first] == of_chain[0]) & (high[first] == of_chain[1])).tolist():
+        yield c, bool(regions[c, 0] == of_seam[first[c]])
+
+
+def _beside(way: Floats, left: bool) -> Floats:
+    """Return the points inside a polyline, moved a little to its left or right: seams touch no boundary."""
+    steps = np.diff(way, axis=0)
+    normal = np.stack([-steps[:, 1], steps[:, 0]], axis=1) / np.hypot(*steps.T)[:, None]
+    return snapped(way[1:-1] + (GAP if left else -GAP) * 0.5 * (normal[:-1] + normal[1:]))
 
 
 def _steps(raw: BoundaryGraph) -> Floats:
