@@ -129,17 +129,24 @@ def _cheapest(down: Floats, across: Floats, low: Ints, high: Ints) -> Ints:
 
 
 def _small_pieces(region: Ints, beyond: Flags, line: int, ends: Ends, least: float) -> Flags:
-    """Tell the pixels of pieces of less than so many, that lie in the corridor as a whole."""
-    code = 2 * region + beyond
-    ids = np.arange(code.size).reshape(code.shape)
-    same = [code[1:] == code[:-1], code[:, 1:] == code[:, :-1]]
-    a = np.concatenate([ids[:-1][same[0]], ids[:, :-1][same[1]]])
-    b = np.concatenate([ids[1:][same[0]], ids[:, 1:][same[1]]])
-    piece, n = linked(a, b, code.size)
+    """Tell the pixels of pieces of less than so many, cut off by the route, that lie in the corridor as a whole."""
+    code, ids = 2 * region + beyond, np.arange(region.size).reshape(region.shape)
+    a, b = (np.concatenate(ends) for ends in zip(_pairs(ids, code), _pairs(ids.T, code.T), strict=True))
+    same = code.ravel()[a] == code.ravel()[b]
+    piece, n = linked(a[same], b[same], code.size)
+    stays = np.bincount(piece, minlength=n) >= least
+    apart = np.ones(n, bool)  # from the rest of its region beyond the route
+    cut = (region.ravel()[a] == region.ravel()[b]) & ~same
+    apart[piece[a[cut]]] = apart[piece[b[cut]]] = False
     piece = piece.reshape(code.shape)
     low, high = _bounds(code.shape, line, ends)
     column = np.arange(code.shape[1])
     outside = (column < np.maximum(low[:-1], low[1:])[:, None]) | (column >= np.minimum(high[:-1], high[1:])[:, None])
-    stays = np.bincount(piece.ravel(), minlength=n) >= least
     stays[piece[outside]] = True
-    return ~stays[piece]
+    return np.asarray(~(stays | apart)[piece])
+
+
+def _pairs(ids: Ints, code: Ints) -> tuple[Ints, Ints]:
+    """Return pixels and those below them, of one region."""
+    same = code[1:] >> 1 == code[:-1] >> 1
+    return ids[:-1][same], ids[1:][same]
