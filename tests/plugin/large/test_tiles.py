@@ -347,6 +347,9 @@ def test_a_crop_of_a_map_lies_where_it_does_on_the_map(tmp_path: Path) -> None:
 def test_options_of_decks_are_checked_before_any_work(picture: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.msh has no option 'thickness'"):
         meshed(picture, tmp_path / "out", deck=tmp_path / "a.msh", deck_options={"thickness": 2.0})
+    for name, value in (("thickness", -2.0), ("analysis", "plain stress"), ("deck", "torsion"), ("deck", "tension")):
+        with pytest.raises(InputError, match=name):
+            meshed(picture, tmp_path / "out", deck=tmp_path / "a.inp", deck_options={name: value})
     with pytest.raises(InputError, match="none is asked for"):
         meshed(picture, tmp_path / "out", deck_options={"thickness": 2.0})
     assert not (tmp_path / "out").exists()
