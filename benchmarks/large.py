@@ -3,7 +3,7 @@
     python benchmarks/large.py                       disks, geology, land cover, grains of 1,024 x 1,024 px
     python benchmarks/large.py --only map.png        a picture of flat colours
     python benchmarks/large.py --side 4096 --tile 2048 --workers 2
-    python benchmarks/large.py --side 16384 --tile 4096 --workers 2 --no-whole --only disks
+    python benchmarks/large.py --side 16384 --tile 4096 --workers 1 2 --threads 1 --no-whole --only disks
 
 Irregular nodes and scaled Jacobians are those within 40 px of where tiles meet ("band"), against all others, and
 against the same places of the picture meshed as a whole. Seconds are CPU seconds of all processes.
@@ -18,6 +18,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -143,20 +144,21 @@ def cracks(mesh: QuadMesh, shape: tuple[int, int]) -> tuple[float, int, int, int
     return area - shape[0] * shape[1], euler, int((count > 2).sum()), int((~frame).sum())
 
 
-def measure(kind: str, args: argparse.Namespace) -> dict[str, Any]:
+def measure(kind: str, args: argparse.Namespace, workers: int) -> dict[str, Any]:
     """Mesh a picture in tiles and as a whole."""
+    how = MeshOptions(size=SIZE, threads=args.threads)
     labels = drawn(Path(kind)) if kind.endswith(".png") else KINDS[kind](args.side)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.npy"
         np.save(path, labels)
         with seconds() as tiled_time:
             made: TiledMesh = mesh_tiles(
-                path, Path(folder) / "out", MeshOptions(size=SIZE), tile=args.tile, keep_whole=args.keep_whole,
-                workers=args.workers,
-            )  # fmt: skip
+                path, Path(folder) / "out", how, tile=args.tile, keep_whole=args.keep_whole, workers=workers
+            )
         report = made.report
         row: dict[str, Any] = {
             "picture": kind,
+            "workers": workers,
             "report": report["quality"],
             "regions": report["regions"],
             "tiled": tiled_time,
@@ -165,7 +167,7 @@ def measure(kind: str, args: argparse.Namespace) -> dict[str, Any]:
             mesh = made.mesh()
             row |= {"conforming": cracks(mesh, labels.shape), "in_tiles": figures(mesh, labels.shape, args.tile)}
             with seconds() as whole_time:
-                whole = mesh_image(labels, MeshOptions(size=SIZE))
+                whole = mesh_image(labels, how)
             row |= {"as_whole": figures(whole, labels.shape, args.tile), "whole": whole_time}
     return row
 
@@ -173,7 +175,9 @@ def measure(kind: str, args: argparse.Namespace) -> dict[str, Any]:
 def line(row: dict[str, Any]) -> str:
     """Return a line of the table."""
     if "in_tiles" not in row:
-        return f"| {row['picture']} | {row['report']['n_quads']} | {row['report']['min_sj']:.3f} | {row['tiled']} |"
+        cpu, wall = row["tiled"]["cpu"], row["tiled"]["wall"]
+        told = f"{row['report']['n_quads']} quads, min SJ {row['report']['min_sj']:.3f}"
+        return f"| {row['picture']}, {row['workers']} workers | {told} | {cpu:.0f} CPU s, {wall:.0f} s by the clock |"
     a, b = row["in_tiles"], row["as_whole"]
     error, euler, shared, off = row["conforming"]
     cells = (
@@ -200,14 +204,15 @@ def main() -> None:
     parser.add_argument("--side", type=int, default=1024)
     parser.add_argument("--tile", type=int, default=512)
     parser.add_argument("--keep-whole", type=int, default=128)
-    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--workers", type=int, nargs="+", default=[1], help="several numbers: one after the other")
+    parser.add_argument("--threads", type=int, default=0, help="of each worker; 0: as many as there are cores")
     parser.add_argument("--only", help=f"{', '.join(KINDS)}, or a PNG file of flat colours")
     parser.add_argument("--no-whole", action="store_true")
     parser.add_argument("--log", type=Path)
     args = parser.parse_args()
     print(HEAD)
-    for kind in [args.only] if args.only else KINDS:
-        row = measure(kind, args)
+    for kind, workers in product([args.only] if args.only else KINDS, args.workers):
+        row = measure(kind, args, workers)
         print(line(row))
         sys.stdout.flush()
         if args.log:

@@ -1,6 +1,6 @@
 """Chains that are cut through a region for a time, so that its parts can be meshed apart: others know nothing of them.
 
-A seam is straight between its ends, but goes round what lies close beside it. Boundaries keep the nodes that they would
+A seam follows its pixels smoothly, but goes round what lies close beside it. Boundaries keep the nodes that they would
 have without it, but for one where it ends: no edge gets shorter because a seam is near, no sector is too sharp for it.
 """
 
@@ -47,13 +47,13 @@ def _offsets_of(counts: Ints) -> Ints:
 
 
 def lay_seams(points: Floats, curves: Curves, is_seam: Flags, room: float) -> None:
-    """Put the points of seams between their ends, in place: on a straight line, but `room` away from boundaries."""
+    """Put the points of seams between their ends, in place: smoothly, but `room` away from boundaries."""
     if is_seam.any():
-        _straighten(points, curves, is_seam, int(4 * room))
+        _smoothen(points, curves, is_seam, int(4 * room))
         _bend(points, curves, is_seam, room)
 
 
-def _straighten(points: Floats, curves: Curves, is_seam: Flags, reach: int) -> None:
+def _smoothen(points: Floats, curves: Curves, is_seam: Flags, reach: int) -> None:
     """Average the pixel boundary of seams over so many points on each side, fewer near their ends: twice."""
     for c in np.flatnonzero(is_seam):
         part = slice(curves.offsets[c], curves.offsets[c + 1])
