@@ -52,7 +52,7 @@ def _oina_group(file: Any) -> Any:
 
 def _oina_map(path: Path, group: Any, options: ReadOptions) -> CrystalMap:
     header, data = group["Header"], group["Data"]
-    n_cols, n_rows = int(_scalar(header["X Cells"])), int(_scalar(header["Y Cells"]))
+    n_cols, n_rows = int(_scalar(path, header["X Cells"])), int(_scalar(path, header["Y Cells"]))
     assert_pixels(path, n_cols, n_rows, options)
     n = n_rows * n_cols
     for name in ("Phase", "Euler"):
@@ -66,19 +66,33 @@ def _oina_map(path: Path, group: Any, options: ReadOptions) -> CrystalMap:
     unknown = np.setdiff1d(phase[~lost], list(phases))
     if len(unknown):
         raise InputError(f"{path} holds phase {unknown[0]}, its header names {sorted(phases)}: export it anew")
-    size = size_of(float(_scalar(header["X Step"])), float(_scalar(header["Y Step"])), "um", "step of the map")
+    size = size_of(
+        float(_scalar(path, header["X Step"])), float(_scalar(path, header["Y Step"])), "um", "step of the map"
+    )
     return CrystalMap(np.where(lost, -1, phase).astype(np.int32), np.nan_to_num(euler), phases, size)
 
 
 def _oina_phase(path: Path, group: Any) -> Phase:
-    laue = int(_scalar(group["Laue Group"]))
+    laue = int(_scalar(path, group["Laue Group"]))
     return Phase(
         texts_of(path, group["Phase Name"])[0], LAUE_GROUPS[laue - 1] if 1 <= laue <= len(LAUE_GROUPS) else "-1"
     )
 
 
-def _scalar(dataset: Any) -> Any:
-    return np.ravel(dataset[()])[0]
+def _scalar(path: Path, dataset: Any) -> Any:
+    return _numbers(path, dataset)[0]
+
+
+def _numbers(path: Path, dataset: Any) -> NDArray[Any]:
+    """Return the numbers of a small dataset, in a row."""
+    _assert_numbers(path, dataset)
+    return np.ravel(dataset[()])
+
+
+def _assert_numbers(path: Path, dataset: Any) -> None:
+    """Raise for all but numbers: what damage turns into something else may take the HDF5 library down."""
+    if dataset.dtype.kind not in "biuf" or not dataset.size:
+        raise InputError(f"{path} holds no numbers in {dataset.name}: it is damaged, save it anew")
 
 
 # -------------------------------------------------------------------------------------------------- arrays
@@ -89,7 +103,7 @@ def _array_picture(path: Path, file: Any, options: ReadOptions) -> Picture:
     name = chosen_array(path, list(arrays), _by_its_end(arrays, options), _grains_among(arrays))
     dataset = arrays[name]
     values = _plane(path, name, dataset, options)
-    calibration, notes = Calibration(_spacing(file, name)), (f"array {name}",)
+    calibration, notes = Calibration(_spacing(path, file, name)), (f"array {name}",)
     is_labels = name.endswith(f"/{_GRAINS}")
     found = replace(picture_of(values, str(path)), labels=is_labels, calibration=calibration, notes=notes)
     return _with_crystals(found, path, dataset, options) if is_labels else found
@@ -144,7 +158,8 @@ def _plane(path: Path, name: str, dataset: Any, options: ReadOptions) -> NDArray
 
 
 def _assert_sound(path: Path, dataset: Any, options: ReadOptions) -> None:
-    """Raise for values in other files, and for chunks that unpack to more than they stand for."""
+    """Raise for all but numbers, for values in other files, and for chunks that unpack to more than they stand for."""
+    _assert_numbers(path, dataset)
     if dataset.external or dataset.is_virtual:
         raise InputError(f"{path} keeps {dataset.name} in other files: save it into one")
     if dataset.chunks is None:
@@ -160,14 +175,17 @@ def _assert_sound(path: Path, dataset: Any, options: ReadOptions) -> None:
             assert_unpacks(path, dataset.id.read_direct_chunk(chunk.chunk_offset)[1], size)
 
 
-def _spacing(file: Any, name: str) -> PixelSize | None:
+def _spacing(path: Path, file: Any, name: str) -> PixelSize | None:
     """Return DREAM.3D's spacing: a dataset of the geometry beside the arrays, or an attribute of it (DREAM3D-NX)."""
     container = file[name].parent.parent
     geometry = container.get("_SIMPL_GEOMETRY")
-    values = (
-        geometry["SPACING"][()] if geometry is not None and "SPACING" in geometry else container.attrs.get("_SPACING")
-    )
-    if values is None or len(values) < 2:
+    if geometry is not None and "SPACING" in geometry:
+        values = _numbers(path, geometry["SPACING"])
+    elif "_SPACING" in container.attrs and container.attrs.get_id("_SPACING").dtype.kind in "iuf":
+        values = np.ravel(container.attrs["_SPACING"])
+    else:
+        return None
+    if len(values) < 2:
         return None
     return size_of(float(values[0]), float(values[1]), "", "SPACING of DREAM.3D")
 
@@ -199,7 +217,7 @@ def _phases(path: Path, container: Any) -> dict[int, Phase]:
     """Return the phases of the ensemble data beside the cells; number 0 stands for none."""
     for group in container.values():
         if hasattr(group, "get") and "CrystalStructures" in group:
-            codes = np.ravel(group["CrystalStructures"][()]).tolist()
+            codes = _numbers(path, group["CrystalStructures"]).tolist()
             texts = texts_of(path, group["PhaseName"]) if "PhaseName" in group else []
             return {
                 k: Phase(texts[k] if k < len(texts) else f"phase {k}", _LAUE.get(int(code), "-1"))

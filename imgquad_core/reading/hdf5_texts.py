@@ -20,6 +20,8 @@ import numpy as np
 
 from imgquad_core.errors import InputError
 
+from .decoding import optional
+
 _MOST_TEXTS = 100_000
 _HEAD = 16  #: bytes before the first object of a heap, and before the bytes of each object
 _REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
@@ -35,6 +37,8 @@ def texts_of(path: Path, dataset: Any) -> list[str]:
     """
     if dataset.size is None or dataset.size > _MOST_TEXTS:
         raise InputError(f"{path} holds {dataset.size} texts in {dataset.name}: it is damaged, save it anew")
+    if optional("hdf5", path).check_string_dtype(dataset.dtype) is None:
+        raise InputError(f"{path} holds no texts in {dataset.name}: it is damaged, save it anew")
     if dataset.dtype.kind == "O":
         _assert_sound_heaps(path, dataset)
     values = np.ravel(dataset[()]).tolist()

@@ -178,6 +178,17 @@ def test_chunks_of_zarr_that_unpack_to_far_more_are_refused(tmp_path: Path, code
 # ---------------------------------------------------------------------------------------------------- HDF5
 
 
+@pytest.mark.parametrize(("name", "kind"), [("Phases/1/Phase Name", "texts"), ("Phases/1/Laue Group", "numbers")])
+def test_what_is_neither_text_nor_number_is_refused(tmp_path: Path, name: str, kind: str) -> None:
+    """The HDF5 library may end the process over values that damage has made rows of bytes."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(write_oina(tmp_path / "a.h5oina"), "r+") as file:
+        del file[f"1/EBSD/Header/{name}"]
+        file.create_dataset(f"1/EBSD/Header/{name}", (1,), h5py.vlen_dtype(np.uint8))
+    with pytest.raises(InputError, match=f"holds no {kind} in .*{name}"):
+        read_picture(tmp_path / "a.h5oina")
+
+
 def test_an_h5oina_map(tmp_path: Path) -> None:
     path = write_oina(tmp_path / "a.h5oina")
     found = read_picture(path)
