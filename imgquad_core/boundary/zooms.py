@@ -159,9 +159,9 @@ def _lattice(places: Floats, weight: Floats, step: float) -> _Lattice | None:
 def _fitted(places: Floats, share: Floats, found: _Lattice) -> _Lattice:
     """Return the line of least squares of places over their numbers."""
     number = found.number(places)
-    n, place = number @ share, places @ share
-    spread = (number - n) ** 2 @ share
-    step = float((number - n) * (places - place) @ share / spread) if spread > 0.0 else found.step
+    n, place = (share * number).sum(), (share * places).sum()
+    spread = (share * (number - n) ** 2).sum()
+    step = float((share * (number - n) * (places - place)).sum() / spread) if spread > 0.0 else found.step
     return _Lattice(step, float(place - step * n))
 
 
