@@ -5,6 +5,7 @@ Prints wall seconds, and CPU seconds of the processes, which say more on a machi
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
 import statistics
@@ -185,7 +186,10 @@ def measure(bench: Bench, picture: Path, size: float) -> None:
 def main() -> None:
     from playwright.sync_api import sync_playwright
 
-    columns, rows, size = (float(each) for each in (sys.argv[1:] or (2200, 2200, 4)))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, usual in (("columns", 2200), ("rows", 2200), ("size", 4)):
+        parser.add_argument(name, nargs="?", type=float, default=usual)
+    columns, rows, size = vars(parser.parse_args()).values()
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores; {columns:g} x {rows:g} pixels, size {size:g}")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         picture = Path(folder) / "rock.png"
