@@ -122,7 +122,7 @@ def segment_picture(
     void = void_of(picture, options)
     marks = None if options.marks is None else marks_of(options.marks, picture.shape)
     turn = turn_of_picture(picture.values)  # filters are not alike in all directions
-    picture = replace(picture, values=np.ascontiguousarray(turn.picture(picture.values)))
+    picture = replace(picture, values=np.ascontiguousarray(turn.picture(picture.values)), opaque=None, void=None)
     void = None if void is None else np.ascontiguousarray(turn.picture(void))
     marks = None if marks is None else replace(marks, labels=np.ascontiguousarray(turn.picture(marks.labels)))
     found = void_told(_found(picture, options, void, marks), options)

@@ -94,6 +94,15 @@ def test_so_it_is_with_raw_pictures_and_marks(turn: Turn) -> None:
         assert len(np.unique(plain.labels)) > 1
 
 
+@pytest.mark.parametrize("turn", TURNS[1:])
+def test_so_it_is_with_pixels_that_hold_nothing(turn: Turn) -> None:
+    values = labels_of_kind("cells", 30, 44, 3, 7) * 80.0 + np.random.default_rng(1).normal(0, 9, (30, 44))
+    values[2:9, 5:20] = np.nan
+    plain, turned = segment(values), segment(turn.picture(values))
+    assert np.array_equal(plain.labels < 0, np.isnan(values))
+    assert np.array_equal(turn.picture(plain.labels), turned.labels)
+
+
 def test_the_diagonal_policy_is_of_the_picture_as_it_lies() -> None:
     labels = np.array([[0, 1], [1, 0]], np.int32)
     diagonal = ExtractionOptions(policy="diagonal")
