@@ -43,7 +43,7 @@ def any_of_chain(flags: Flags, offsets: Ints) -> Flags:
 
 def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
     """Return the graph with a mid-point on every edge of the flagged chains, but for held ones."""
-    return _split(graph, chains[chain_of_places(graph)])
+    return with_mid_points(graph, chains[chain_of_places(graph)])
 
 
 def refined(graph: BoundaryGraph, points: Ints, reach: int) -> BoundaryGraph:
@@ -63,7 +63,33 @@ def refined(graph: BoundaryGraph, points: Ints, reach: int) -> BoundaryGraph:
     split = np.zeros(len(graph.chain_points) + 1, np.int64)
     np.add.at(split, np.maximum(first, begin), 1)
     np.add.at(split, np.minimum(at - into + stride * (reach + 1), end), -1)
-    return _split(graph, np.cumsum(split)[:-1] > 0)
+    return with_mid_points(graph, np.cumsum(split)[:-1] > 0)
+
+
+def with_mid_points(graph: BoundaryGraph, split: Flags) -> BoundaryGraph:
+    """Return the graph with a mid-point on the edges behind flagged entries of `chain_points`, but for held ones."""
+    offsets, ids = graph.chain_offsets, graph.chain_points
+    n, chain = len(graph.points), chain_of_places(graph)
+    split = split.copy()
+    split[offsets[1:] - 1] = False  # no edge behind the last point of a chain
+    is_held = graph.point_kind[ids] >= PointKind.HELD
+    split &= ~is_held & ~np.roll(is_held, -1)
+    at = np.flatnonzero(split)
+    new = n + np.arange(len(at))
+    points = np.vstack([graph.points, 0.5 * (graph.points[ids[at]] + graph.points[ids[at + 1]])])
+    straight = np.isin(graph.chain_regions, VOID).any(axis=1)[chain[at]]
+    kind = np.where(straight & _on_frame(points[n:], graph.shape), 2, 0)
+    counts = np.diff(offsets) + np.bincount(chain[at], minlength=graph.n_chains)
+    return BoundaryGraph(
+        points,
+        np.concatenate([graph.point_kind, kind]),
+        np.concatenate([[0], np.cumsum(counts)]),
+        np.insert(ids, at + 1, new),
+        graph.chain_regions,
+        graph.region_label,
+        graph.region_pixels,
+        graph.shape,
+    )
 
 
 def with_chains_of(graph: BoundaryGraph, finer: BoundaryGraph, chains: Flags) -> BoundaryGraph:
@@ -88,32 +114,6 @@ def without_unused_points(graph: BoundaryGraph) -> tuple[BoundaryGraph, Ints]:
 def chain_of_places(graph: BoundaryGraph) -> Ints:
     """Return the chain of each entry of `chain_points`."""
     return rows_of(graph.chain_offsets)
-
-
-def _split(graph: BoundaryGraph, split: Flags) -> BoundaryGraph:
-    """Return the graph with a mid-point on the edges behind the flagged entries of `chain_points`."""
-    offsets, ids = graph.chain_offsets, graph.chain_points
-    n, chain = len(graph.points), chain_of_places(graph)
-    split = split.copy()
-    split[offsets[1:] - 1] = False  # no edge behind the last point of a chain
-    is_held = graph.point_kind[ids] >= PointKind.HELD
-    split &= ~is_held & ~np.roll(is_held, -1)
-    at = np.flatnonzero(split)
-    new = n + np.arange(len(at))
-    points = np.vstack([graph.points, 0.5 * (graph.points[ids[at]] + graph.points[ids[at + 1]])])
-    straight = np.isin(graph.chain_regions, VOID).any(axis=1)[chain[at]]
-    kind = np.where(straight & _on_frame(points[n:], graph.shape), 2, 0)
-    counts = np.diff(offsets) + np.bincount(chain[at], minlength=graph.n_chains)
-    return BoundaryGraph(
-        points,
-        np.concatenate([graph.point_kind, kind]),
-        np.concatenate([[0], np.cumsum(counts)]),
-        np.insert(ids, at + 1, new),
-        graph.chain_regions,
-        graph.region_label,
-        graph.region_pixels,
-        graph.shape,
-    )
 
 
 def _on_frame(points: Floats, shape: tuple[int, int]) -> Flags:

@@ -108,7 +108,7 @@ def cleaned_band(
     _, region = np.unique(whole.region, return_inverse=True)
     beside = _in_several(region.ravel(), tile, int(region.max()) + 1)[region.ravel()]
     quads = np.flatnonzero(beside & nodes_around(whole.quads, seam, BAND - 1)[whole.quads].any(axis=1))
-    points, corners, region = _cleaned(whole, quads, nodes_around(whole.quads, seam, SEEDS))
+    points, corners, region = cleaned(whole, quads, nodes_around(whole.quads, seam, SEEDS))
     centre = points[corners].mean(axis=1)
     column, row = centre[:, 0] // grid.tile, (grid.shape[0] - centre[:, 1]) // grid.tile
     owner = (row * grid.across + column).astype(np.int64)
@@ -132,15 +132,15 @@ def _in_several(what: Ints, tile: Ints, n: int) -> Flags:
     return np.bincount(np.unique(what * n_tiles + tile) // n_tiles, minlength=n) > 1
 
 
-def _cleaned(whole: TileMesh, quads: Ints, near: Flags) -> tuple[Floats, Ints, Ints]:
-    """Return points, quads and their regions that take the place of some quads."""
+def cleaned(whole: TileMesh, quads: Ints, near: Flags) -> tuple[Floats, Ints, Ints]:
+    """Return points, quads and their regions that take the place of some quads, cleaned up from some nodes on."""
     used, corners = np.unique(whole.quads[quads], return_inverse=True)
     corners = corners.reshape(-1, 4)
     regions, label = np.unique(whole.region[quads], return_inverse=True)
     names = tuple(map(str, regions.tolist()))
     materials = Materials(np.arange(len(regions), dtype=np.int32), names, np.zeros((len(regions), 3), np.uint8))
     mesh = trace_mesh(whole.points[used], corners, label, materials)
-    old = _held(cut_at_chains(mesh), _on_rim(whole, quads)[used], used)
+    old = _held(cut_at_chains(mesh), rim_of(whole, quads)[used], used)
     seeds = near[used]
     new = old
     for how in PASSES:
@@ -150,7 +150,7 @@ def _cleaned(whole: TileMesh, quads: Ints, near: Flags) -> tuple[Floats, Ints, I
     return np.asarray(made.points), np.asarray(made.quads), regions[made.quad_material]
 
 
-def _on_rim(whole: TileMesh, quads: Ints) -> Flags:
+def rim_of(whole: TileMesh, quads: Ints) -> Flags:
     """Tell the nodes where the band ends inside a region: they are held, with as many quads as they have."""
     inside = np.zeros(len(whole.quads), bool)
     inside[quads] = True

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.halfedge import twins_of
-from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.mesher import MeshingOptions, fill_faces
-from imgquad_core.mesher.strides import near_seams
-from imgquad_core.model import VOID, PointKind, QuadMesh
+from imgquad_core.model import VOID
 
 from .outlines import Outlines, corner_of, graph_of
 
@@ -36,17 +34,16 @@ class Patch(NamedTuple):
     region: Ints
 
 
-class Wished(NamedTuple):
-    """A mesh, and the shared chains whose edges it would have halved."""
+class Made(NamedTuple):
+    """A mesh, and on which stride each face was meshed."""
 
-    mesh: TileMesh | None  #: None where faces cannot be filled without that
-    chains: Flags
-    stride: Ints  #: of each face, 0 if there is no mesh
+    mesh: TileMesh
+    stride: Ints
     fell: Flags  #: those that were worse on a wider one
 
 
-def mesh_outlines(outlines: Outlines, n_rows: int, options: MeshingOptions, widest: Ints, is_cut: Flags) -> Wished:
-    """Mesh the faces of a tile.
+def mesh_outlines(outlines: Outlines, n_rows: int, options: MeshingOptions, widest: Ints, is_cut: Flags) -> Made | None:
+    """Mesh the faces of a tile; None where they cannot be filled.
 
     Parameters
     ----------
@@ -61,29 +58,18 @@ def mesh_outlines(outlines: Outlines, n_rows: int, options: MeshingOptions, wide
     is_cut : bool, shape (n_faces,)
         Pieces of regions: one that is worse on a wide stride has decided for the region.
     """
-    n = len(outlines.region)
-    failed = Wished(None, outlines.shared, np.zeros(n, np.int64), np.zeros(n, bool))
-    if n == 0:
-        none = np.empty(0, np.int64)
-        return failed._replace(mesh=TileMesh(np.empty((0, 2)), none.reshape(0, 4), none, np.empty(0, bool)))
+    none = np.empty(0, np.int64)
+    if len(outlines.region) == 0:
+        return Made(TileMesh(np.empty((0, 2)), none.reshape(0, 4), none, np.empty(0, bool)), none, np.empty(0, bool))
     try:
         mesh, stride, fell = fill_faces(graph_of(outlines, n_rows), options, widest=widest, once=is_cut)
     except TopologyError:
-        return failed
+        return None
     seam = np.zeros(mesh.n_points, bool)
     for c in np.flatnonzero(outlines.seam):
         seam[mesh.chain_points[mesh.chain_offsets[c] : mesh.chain_offsets[c + 1]]] = True
     made = TileMesh(mesh.points + corner_of(outlines, n_rows), mesh.quads, outlines.region[mesh.quad_region], seam)
-    return Wished(made, _wished(mesh, options.tuning.worst), stride, fell)
-
-
-def _wished(mesh: QuadMesh, worst: float) -> Flags:
-    """Tell the held chains with a quad that is worse than that beside them, those at seams left out."""
-    is_seam, poor = mesh.point_kind == PointKind.SEAM, np.zeros(mesh.n_points, bool)
-    is_poor = scaled_jacobian(mesh.points, mesh.quads) <= worst
-    poor[mesh.quads[is_poor & ~near_seams(mesh.quads, is_seam)]] = True
-    poor &= mesh.point_kind == PointKind.HELD
-    return np.asarray(np.logical_or.reduceat(poor[mesh.chain_points], mesh.chain_offsets[:-1]))
+    return Made(made, stride, fell)
 
 
 def patched(mesh: TileMesh, patches: list[Patch]) -> TileMesh:

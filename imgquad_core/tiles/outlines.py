@@ -10,7 +10,7 @@ the same in every window. Junctions where faces of several tiles meet are never 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -27,6 +27,9 @@ from .regions import Keys, Regions
 
 LONGEST = 16.0  #: px between two tiles that a boundary takes to cross their seam, at one node
 NOBODY = np.iinfo(np.int64).max  #: owner of what is not meshed
+
+#: for keys of shared chains, some of their edges
+EdgesOf = Mapping[tuple[int, ...], Collection[int]]
 
 
 class Outlines(NamedTuple):
@@ -154,9 +157,7 @@ def _compressed(graph: BoundaryGraph, kept: Ints) -> tuple[Ints, Ints, Ints]:
     return offsets, ids.ravel().astype(np.int64), old
 
 
-def settled(
-    t: int, mine: Outlines, others: Callable[[int], Outlines], halved: Collection[tuple[int, ...]] = ()
-) -> Outlines:
+def settled(t: int, mine: Outlines, others: Callable[[int], Outlines], halved: Sequence[EdgesOf] = ()) -> Outlines:
     """Return a tile's outlines with the nodes that other tiles own copied from them, and shared ones held.
 
     Parameters
@@ -167,8 +168,8 @@ def settled(
         As it computed them.
     others : callable
         Returns the outlines of another tile.
-    halved : collection of tuple
-        Keys of shared chains that get a mid-point on every edge: on both sides alike.
+    halved : sequence of mapping
+        For keys of shared chains, which of their edges get a mid-point: on both sides alike, one after the other.
 
     Raises
     ------
@@ -192,8 +193,9 @@ def settled(
                 inner, inner_kind = points[ids], kind[ids]
             else:
                 inner, inner_kind = known[int(mine.owner[c])].chains[tuple(mine.key[c].tolist())]
-            if tuple(mine.key[c].tolist()) in halved:
-                inner, inner_kind = _halved(inner, inner_kind)
+            for edges in halved:
+                at = sorted(edges.get(tuple(mine.key[c].tolist()), ()))
+                inner, inner_kind = _halved(inner, inner_kind, np.array(at, np.int64))
             loop = mine.closed[c]
             inner, inner_kind = (inner[:-1], inner_kind[:-1]) if loop else (inner[1:-1], inner_kind[1:-1])
             new = n + np.arange(len(inner))
@@ -212,11 +214,10 @@ def settled(
     )
 
 
-def _halved(points: Floats, kind: Bytes) -> tuple[Floats, Bytes]:
-    """Return a chain with a mid-point on every edge."""
-    more, of = np.empty((2 * len(points) - 1, 2)), np.full(2 * len(points) - 1, PointKind.HELD, np.uint8)
-    more[::2], more[1::2], of[::2] = points, 0.5 * (points[:-1] + points[1:]), kind
-    return more, of
+def _halved(points: Floats, kind: Bytes, edges: Ints) -> tuple[Floats, Bytes]:
+    """Return a chain with a mid-point on some edges."""
+    middle = 0.5 * (points[edges] + points[edges + 1])
+    return np.insert(points, edges + 1, middle, axis=0), np.insert(kind, edges + 1, PointKind.HELD)
 
 
 class _Index(NamedTuple):

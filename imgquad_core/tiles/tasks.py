@@ -30,10 +30,9 @@ import numpy as np
 
 from imgquad_core.arrays import Floats, Ints, Labels
 from imgquad_core.cleanup.strips import pieces_at
-from imgquad_core.errors import InputError, TopologyError
+from imgquad_core.errors import InputError
 from imgquad_core.fe import FEMesh
 from imgquad_core.measures.quality import quad_areas, scaled_jacobian
-from imgquad_core.mesher import WIDEST
 from imgquad_core.model import VOID
 from imgquad_core.options import MeshOptions
 from imgquad_core.picture import (
@@ -47,14 +46,15 @@ from imgquad_core.picture import (
 )
 from imgquad_core.whole_files import replacing
 
+from .attempts import last_mesh
 from .bands import ROUNDS, cleaned_band, groups_of, seam_places
 from .elements import COLUMNS, Mapped, Ring, as_arrays, joined_sets, named_elements, ring_of, tile_sets
 from .files import load_arrays, save_arrays, save_plane
 from .grid import Box, Grid
 from .job import Job
-from .meshes import Patch, TileMesh, mesh_outlines, open_nodes, patched
+from .meshes import Patch, TileMesh, open_nodes, patched
 from .numbering import Own, Rim, first_numbers, numbers_of, owned
-from .outlines import Outlines, outlines_of, settled
+from .outlines import Outlines, outlines_of
 from .regions import Table, joined_regions, keys_of, tile_regions
 from .routes import Ends, side_of_route
 from .rules import rules_of, save_rules
@@ -63,7 +63,6 @@ from .windows import labels_in, numbers_in, parts_with_routes, regions_of
 
 NOISE_REACH = 64  #: px around a tile that noise removal sees, beside the shortest length that stays
 CORNER_REACH = 5  #: data points around a tile that tell what is joined over corners
-ATTEMPTS = 3  #: at a tile: the later ones only where edges that it shares are to be halved, or strides are too wide
 BINS = 1000  #: of scaled Jacobians from 0 to 1
 
 
@@ -198,78 +197,6 @@ def _no_outlines() -> Outlines:
     )  # fmt: skip
 
 
-def _outlines_of(job: Job, t: int) -> Outlines:
-    return Outlines(**load_arrays(job.path("outlines", t)))
-
-
-def mesh(job: Job, t: int, attempt: int, *_: Any) -> None:
-    """Mesh the faces of a tile, with the shared chains halved that it or a neighbour has wished for before.
-
-    All pieces of a region get the stride that the region as a whole would: the one that none of them is poor on.
-
-    Raises
-    ------
-    TopologyError
-        In the last attempt, faces cannot be filled.
-    """
-    path = job.path("wish", t, attempt)
-    if path.exists():
-        return
-    mine = _outlines_of(job, t)
-    asked = [_halved_before(job, t, mine, k) for k in (attempt - 1, attempt)]
-    widest = _widest(job, mine.region, attempt)
-    if attempt > 0 and asked[0] == asked[1]:
-        before = load_arrays(job.path("wish", t, attempt - 1))
-        if (before["stride"] <= widest).all():
-            save_arrays(path, **before | {"chains": np.empty((0, 4), np.int64)})
-            return
-    rules = job.rules()
-    found = settled(t, mine, lambda other: _outlines_of(job, other), asked[1])
-    how = rules.options.meshing(rules.legend.materials)
-    made = mesh_outlines(found, job.grid.shape[0], how, widest, regions_of(job).is_cut[mine.region])
-    if made.mesh is not None:
-        save_arrays(job.path("mesh", t, attempt), **made.mesh._asdict())
-    elif attempt == ATTEMPTS - 1 or not mine.shared.any():
-        raise TopologyError(f"tile {job.grid.place(t)} cannot be filled between its neighbours")
-    chains = mine.key[made.chains & mine.shared]
-    save_arrays(path, chains=chains, made=attempt, region=mine.region, stride=made.stride, fell=made.fell)
-
-
-def _halved_before(job: Job, t: int, mine: Outlines, attempt: int) -> set[tuple[int, ...]]:
-    """Return the shared chains of a tile that were wished to be halved before an attempt."""
-    keys = {tuple(key) for key in mine.key[mine.shared].tolist()}
-    found: set[tuple[int, ...]] = set()
-    for other in job.grid.around(t):
-        for k in range(attempt):
-            found |= {tuple(key) for key in load_arrays(job.path("wish", other, k))["chains"].tolist()} & keys
-    return found
-
-
-def strides(job: Job, *_: Any) -> None:
-    """Find the stride that all pieces of each region can be meshed on."""
-    path = job.path("strides")
-    if path.exists():
-        return
-    is_cut = regions_of(job).is_cut
-    found = np.full(len(is_cut), WIDEST)
-    for t in range(job.grid.n_tiles):
-        made = load_arrays(job.path("wish", t, 0))
-        here = made["fell"] & is_cut[made["region"]]
-        np.minimum.at(found, made["region"][here], made["stride"][here])
-    narrow = np.flatnonzero(found < WIDEST)
-    save_arrays(path, region=narrow, widest=found[narrow])
-
-
-def _widest(job: Job, region: Ints, attempt: int) -> Ints:
-    """Return the stride that faces of some regions are meshed on at most."""
-    found = np.full(len(region), WIDEST)
-    if attempt > 0:
-        known = load_arrays(job.path("strides"))
-        limits = dict(zip(known["region"].tolist(), known["widest"].tolist(), strict=True))
-        found[:] = [limits.get(number, WIDEST) for number in region.tolist()]
-    return found
-
-
 def band(job: Job, kind: str, group: tuple[int, ...], *_: Any) -> None:
     """Clean up across the seams of a group of tiles."""
     path = job.path(f"band-{kind}", *group)
@@ -294,8 +221,7 @@ def bands_of(grid: Grid, t: int, rounds: int) -> list[tuple[str, tuple[int, ...]
 
 def _state(job: Job, t: int, rounds: int) -> TileMesh:
     """Return the mesh of a tile after some rounds of bands."""
-    made = int(load_arrays(job.path("wish", t, ATTEMPTS - 1))["made"])
-    found = TileMesh(**load_arrays(job.path("mesh", t, made)))
+    found = last_mesh(job, t)
     for kind in ROUNDS[:rounds]:
         patches = []
         for group in (group for each, group in bands_of(job.grid, t, rounds) if each == kind):

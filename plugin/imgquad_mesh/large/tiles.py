@@ -14,7 +14,7 @@ from imgquad_core.errors import InputError
 from imgquad_core.model import QuadMesh
 from imgquad_core.options import MeshOptions
 from imgquad_core.reading import Calibration
-from imgquad_core.tiles import ROUNDS, Job, Source, grid_of, groups_of, source_of, stamp_of
+from imgquad_core.tiles import ROUNDS, Job, Source, attempts, grid_of, groups_of, source_of, stamp_of
 from imgquad_core.tiles import tasks as work
 from imgquad_core.tiles.files import save_plane
 from imgquad_core.tiles.grid import least_tile
@@ -265,12 +265,12 @@ def _steps(job: Job, stored: Any, form: str) -> Iterator[Step]:
     for t in every:
         yield Step(f"outlines-{t}", Guarded(work.outlines), (job, t, after("route", grid.seen_by(t))))
     for t in every:
-        yield Step(f"mesh-{t}-0", Guarded(work.mesh), (job, t, 0, after("outlines", grid.around(t))))
-    yield Step("strides", work.strides, (job, [Result(f"mesh-{t}-0") for t in every]))
-    for k in range(1, work.ATTEMPTS):
+        yield Step(f"mesh-{t}-0", Guarded(attempts.mesh), (job, t, 0, after("outlines", grid.around(t))))
+    yield Step("strides", attempts.strides, (job, [Result(f"mesh-{t}-0") for t in every]))
+    for k in range(1, attempts.ATTEMPTS):
         for t in every:
             needs = [Result("strides"), *(Result(f"mesh-{other}-{k - 1}") for other in grid.around(t))]
-            yield Step(f"mesh-{t}-{k}", Guarded(work.mesh), (job, t, k, needs))
+            yield Step(f"mesh-{t}-{k}", Guarded(attempts.mesh), (job, t, k, needs))
     yield from _band_steps(job)
     for t in every:
         bands = [Result(_band_key(*band)) for band in work.bands_of(grid, t, len(ROUNDS))]
@@ -304,7 +304,7 @@ def _band_key(kind: str, group: tuple[int, ...]) -> str:
 
 
 def _meshed_key(t: int) -> str:
-    return f"mesh-{t}-{work.ATTEMPTS - 1}"
+    return f"mesh-{t}-{attempts.ATTEMPTS - 1}"
 
 
 def _look(job: Job, _stored: Any) -> int:

@@ -7,29 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imgquad_core.boundary import ExtractionOptions, SmoothingOptions, extract_boundaries, smooth_boundaries
+from imgquad_core.boundary import extract_boundaries, smooth_boundaries
 from imgquad_core.cleanup.faces import FaceQuads
 from imgquad_core.mesher.strides import SEAM_RINGS, judged
 from imgquad_core.model import BoundaryGraph, PointKind
-from imgquad_core.tiles.outlines import Outlines, outlines_of, settled
-from imgquad_core.tiles.regions import Keys, Regions
+from imgquad_core.tiles.outlines import Outlines, settled
 from support.labels import label_image
-
-SHAPE, LINE = (120, 160), 80
-SMOOTHING = SmoothingOptions(size=4.0, step=(1.0, 1.0))
-
-
-def outlines(labels: np.ndarray, t: int) -> Outlines:
-    """Outlines of one of two tiles beside a line from top to bottom, all regions of the picture being cut."""
-    image = label_image(labels.astype(np.int32))
-    whole = extract_boundaries(image, ExtractionOptions())
-    assert len(np.unique(labels)) == len(whole.region_label)  # a region a label: they number each other
-    tile = (np.indices(SHAPE)[1] >= LINE).astype(np.int64)
-    codes, pixels = np.unique(2 * labels + tile, return_inverse=True)
-    keys = Keys(pixels.reshape(SHAPE).astype(np.int32), codes // 2, codes % 2)
-    none = np.empty(0, np.int64)
-    known = Regions(np.arange(labels.max() + 1, dtype=np.int32), none, none, np.ones(9, bool), none, none, none)
-    return outlines_of(t, keys, (0, 0, *SHAPE[::-1]), SHAPE[0], known, ExtractionOptions(), SMOOTHING)
+from support.tiles import LINE, SHAPE, SMOOTHING, outlines
 
 
 def layers(slope: float) -> np.ndarray:

@@ -21,7 +21,7 @@ from imgquad_core.fe import FEMesh, fe_mesh
 from imgquad_core.fe.sets import BORDERS
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.model import PointKind
-from imgquad_core.tiles import tasks
+from imgquad_core.tiles import attempts, tasks
 from imgquad_core.tiles.files import load_arrays
 from imgquad_core.writers import safe_names, write_mesh
 from imgquad_mesh.__main__ import main
@@ -143,7 +143,7 @@ def test_all_pieces_of_a_region_have_the_stride_of_the_worst(tmp_path: Path) -> 
         labels[np.hypot(x - cx, y - cy) < rng.uniform(6, 22)] = 1
     job = meshed(labels, tmp_path / "out").job
     first = [load_arrays(job.path("wish", t, 0)) for t in (0, 1)]
-    last = [load_arrays(job.path("wish", t, tasks.ATTEMPTS - 1)) for t in (0, 1)]
+    last = [load_arrays(job.path("wish", t, attempts.ATTEMPTS - 1)) for t in (0, 1)]
     assert [int(row["stride"][row["region"] == 0].item()) for row in first] == [2, 4]
     assert [int(row["stride"][row["region"] == 0].item()) for row in last] == [2, 2]
     assert [int(row["made"]) for row in last] == [0, 1]  # one is as it was
@@ -194,14 +194,14 @@ def test_same_bytes_after_a_kill_a_full_disk_and_lost_files(
     cluster: Any, picture: Path, made: TiledMesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    save = tasks.save_arrays
+    save = attempts.save_arrays
 
     def full(path: Path, **arrays: Any) -> None:
         if path.name == "mesh-1-0.npz":
             raise InputError("cannot write mesh-1-0.npz: No space left on device")
         save(path, **arrays)
 
-    monkeypatch.setattr(tasks, "save_arrays", full)
+    monkeypatch.setattr(attempts, "save_arrays", full)
     with pytest.raises(InputError, match="No space left on device"):
         meshed(picture, tmp_path / "out")
     monkeypatch.undo()
