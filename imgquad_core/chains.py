@@ -47,10 +47,15 @@ def halved(graph: BoundaryGraph, chains: Flags) -> BoundaryGraph:
 
 
 def refined(graph: BoundaryGraph, points: Ints, reach: int) -> BoundaryGraph:
-    """Return the graph with mid-points on the edges of the segments that these points are part of.
+    """Return the graph with mid-points on the edges of the segments that these points are part of."""
+    return with_mid_points(graph, near_segments(graph, points, reach))
 
-    The `reach` segments before and after are halved, too. Chains keep their multiples of four: what is halved there
-    are the four edges of each stride-4 segment.
+
+def near_segments(graph: BoundaryGraph, points: Ints, reach: int) -> Flags:
+    """Tell the entries of `chain_points` behind which is an edge of a segment that these points are part of.
+
+    The `reach` segments before and after count, too. Chains keep their multiples of four if these edges are halved:
+    they are the four edges of each stride-4 segment.
     """
     hit = np.zeros(len(graph.points), bool)
     hit[points] = True
@@ -63,7 +68,7 @@ def refined(graph: BoundaryGraph, points: Ints, reach: int) -> BoundaryGraph:
     split = np.zeros(len(graph.chain_points) + 1, np.int64)
     np.add.at(split, np.maximum(first, begin), 1)
     np.add.at(split, np.minimum(at - into + stride * (reach + 1), end), -1)
-    return with_mid_points(graph, np.cumsum(split)[:-1] > 0)
+    return np.asarray(np.cumsum(split)[:-1] > 0)
 
 
 def with_mid_points(graph: BoundaryGraph, split: Flags) -> BoundaryGraph:

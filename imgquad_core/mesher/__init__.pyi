@@ -1,5 +1,5 @@
 from .efforts import EFFORTS
-from .meshing import Filled, fill_faces, mesh_boundaries
+from .meshing import Filled, fill_faces, fill_held, mesh_boundaries
 from .options import MeshingOptions
 from .strides import WIDEST
 from .triangulators import triangulator_used
@@ -10,6 +10,7 @@ __all__ = [
     "Filled",
     "MeshingOptions",
     "fill_faces",
+    "fill_held",
     "mesh_boundaries",
     "triangulator_used",
 ]

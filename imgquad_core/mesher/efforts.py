@@ -35,9 +35,9 @@ EFFORTS: Mapping[str, Effort] = {
 class Tuning(NamedTuple):
     """Numbers of the mesher that studies settled: handed down, so that a test or the next study can ask for others."""
 
-    worst: float = 0.55  #: scaled Jacobian below which the boundary's edges at a quad are halved, if that helps
-    wishes: int = 3  #: rounds of halving for the sake of poor quads, at most
-    rounds: int = 16  #: rounds of halving in all, at most: those after the wishes are for folded quads
+    worst: float = 0.56  #: scaled Jacobian below which the boundary's edges at a quad are halved, if that helps
+    wishes: int = 8  #: rounds of halving for the sake of poor quads, at most
+    rounds: int = 16  #: rounds of halving for the sake of folded ones, at most
     very_wide: float = 6.0  #: width of a face that is meshed on stride 6, in its coarse segments
     portions: Portions = PORTIONS  #: parts that threads share
 

@@ -32,8 +32,9 @@ from .efforts import EFFORTS
 from .options import MeshingOptions
 from .outline import coarse_segments, with_short_chains_halved
 from .progress import Progress
-from .refits import State, with_musts, with_wishes
+from .refits import State, with_musts
 from .strides import LEAST_WIDTH, WIDEST, consistent, mesh_faces
+from .wishes import with_wishes
 
 STUB = 0.1  # of the longest edge at a node: a shorter one is lengthened in the end, as far as the worst quad allows
 FAIR = 0.86  # below it, in the end, the worst corner of a ring counts alone; 60 degrees give .866
@@ -93,8 +94,7 @@ def fill_faces(
 
     Faces flagged `once` are not tried again on a stride that they were worse on, when edges beside them are halved.
     """
-    if (odd := np.flatnonzero(edges_of_chains(graph) % 2)).size:
-        raise TopologyError(f"chain {odd[0]} has {edges_of_chains(graph)[odd[0]]} edges: give each an even number")
+    _assert_even(graph)
     graph = consistent(graph, np.ones(graph.n_chains, bool), options.triangulator)
     graph = with_short_chains_halved(graph, LEAST_WIDTH)
     progress = Progress(graph.region_pixels / options.face_sizes(graph.region_label) ** 2, told) if told else None
@@ -102,10 +102,35 @@ def fill_faces(
     widest = np.full(n, WIDEST) if widest is None else widest
     meshed = mesh_faces(graph, np.ones(n, bool), options, widest, progress)
     state = State(graph, meshed, widest if once is None else np.where(once & meshed.fell, meshed.stride, widest))
-    state = with_musts(with_wishes(state, options), options)
+    state = with_musts(state, options)
     mesh = _stitch(state.graph, state.meshed.parts, materials or _materials_of(graph.region_label))
     slid = _slid(mesh, graph.shape, EFFORTS[options.effort].slides, options.n_threads, options.tuning.portions)
-    return Filled(slid, state.meshed.stride, state.meshed.fell | (state.widest < widest))
+    mended = with_wishes(slid, graph.shape, lambda area: fill_held(area, options), options)
+    parted = _parted(mended, options.n_threads, options.tuning.portions)
+    return Filled(parted, state.meshed.stride, state.meshed.fell | (state.widest < widest))
+
+
+def _assert_even(graph: BoundaryGraph) -> None:
+    if (odd := np.flatnonzero(edges_of_chains(graph) % 2)).size:
+        raise TopologyError(f"chain {odd[0]} has {edges_of_chains(graph)[odd[0]]} edges: give each an even number")
+
+
+def fill_held(graph: BoundaryGraph, options: MeshingOptions) -> QuadMesh:
+    """Fill a boundary all points of which stay, on stride 2.
+
+    Raises
+    ------
+    TopologyError
+        Quads are folded, or a chain has an odd number of edges.
+    """
+    _assert_even(graph)
+    every = np.ones(len(graph.region_label), bool)
+    graph = consistent(graph, np.ones(graph.n_chains, bool), options.triangulator)
+    meshed = mesh_faces(graph, every, options, np.full(len(every), 2))
+    if meshed.worst.min() <= 0.0:
+        raise TopologyError("quads beside a boundary that is held are folded")
+    mesh = _stitch(graph, meshed.parts, _materials_of(graph.region_label))
+    return _slid(mesh, graph.shape, 0, options.n_threads, options.tuning.portions)
 
 
 def _stitch(graph: BoundaryGraph, parts: list[FaceQuads], materials: Materials) -> QuadMesh:
@@ -144,11 +169,20 @@ def _slid_but(mesh: QuadMesh, held: Flags, rounds: int, threads: int, portions: 
         slide(points, rings, kind, mesh.chain_offsets, mesh.chain_points, gone)
         move(lambda free: newton(points, rings, free, 2, GOOD))
     move(lambda free: untangle(points, rings, free, 4, FAIR))
-    floor, mended = _worst(points, rings.quads), np.zeros(mesh.n_points, bool)
-    move(lambda free: part(points, rings, free, STUB, floor, mended))
+    return replace(mesh, points=points)
+
+
+def _parted(mesh: QuadMesh, threads: int, portions: Portions) -> QuadMesh:
+    """Lengthen edges that are stubs beside the others of their node."""
+    points, mended = mesh.points.copy(), np.zeros(mesh.n_points, bool)
+    rings, (groups, seams) = rings_of(mesh.quads, mesh.n_points), _inner_nodes(mesh, threads, portions)
+    floor = _worst(points, rings.quads)
+    in_threads(groups, lambda free: part(points, rings, free, STUB, floor, mended), threads)
+    part(points, rings, seams, STUB, floor, mended)
     if mended.any():
         near = nodes_around(rings.quads, mended, 1)
-        move(lambda free: untangle(points, rings, free & near, 4, FAIR))
+        in_threads(groups, lambda free: untangle(points, rings, free & near, 4, FAIR), threads)
+        untangle(points, rings, seams & near, 4, FAIR)
     return replace(mesh, points=points)
 
 

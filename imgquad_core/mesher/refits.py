@@ -1,4 +1,4 @@
-"""Rounds that halve the boundary's edges beside poor quads, and keep what is better."""
+"""Rounds that halve the boundary's edges beside folded quads."""
 
 from __future__ import annotations
 
@@ -28,21 +28,6 @@ class State(NamedTuple):
     widest: Ints  #: stride of each face
 
 
-def with_wishes(state: State, options: MeshingOptions) -> State:
-    """Halve edges beside poor quads; what gets better by that is kept."""
-    for attempt in range(options.tuning.wishes):
-        poor = poor_rim(state, options.tuning.worst)
-        if len(poor) == 0:
-            break
-        try:
-            state = _refitted(state, _finer(state.graph, poor, attempt, options.tuning), options)
-        except TopologyError:
-            if state.meshed.worst.min(initial=1.0) <= 0.0:
-                raise
-            break  # what is there is valid
-    return state
-
-
 def with_musts(state: State, options: MeshingOptions) -> State:
     """Halve edges beside folded quads until none is left.
 
@@ -51,7 +36,7 @@ def with_musts(state: State, options: MeshingOptions) -> State:
     TopologyError
         Quads stay folded.
     """
-    for attempt in range(options.tuning.wishes, options.tuning.rounds):
+    for attempt in range(options.tuning.rounds):
         folded = poor_rim(state, 0.0)
         if len(folded) == 0:
             break
@@ -92,12 +77,12 @@ def _groups_across(graph: BoundaryGraph, chains: Flags) -> Ints:
 def _finer(graph: BoundaryGraph, poor: Ints, attempt: int, tuning: Tuning) -> BoundaryGraph:
     """Return the graph with halved edges beside points with poor quads.
 
-    A halved edge is straight, so no point there can fold a quad. With every wish, and later after some attempts, the
-    reach grows, and in the end all edges are halved: that settles it whatever the picture.
+    A halved edge is straight, so no point there can fold a quad. The reach grows, and in the end all edges are halved:
+    that settles it whatever the picture.
     """
     if attempt == tuning.rounds - 1:
         return halved(graph, np.ones(graph.n_chains, bool))
-    return refined(graph, poor, attempt if attempt < tuning.wishes else 2 ** max(attempt - PATIENCE, 0) - 1)
+    return refined(graph, poor, 2 ** max(attempt - PATIENCE, 0) - 1)
 
 
 def poor_rim(state: State, limit: float) -> Ints:

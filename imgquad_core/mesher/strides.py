@@ -42,7 +42,6 @@ ENOUGH = 0.65  # worst element from which a face is not tried with a smaller str
 BACKGROUND_AREA = 2.5  # of a background triangle, over the square of the edge length
 GROUP, MOST_GROUPS = 1000, 8  # cells of faces that are triangulated together, at least; groups at most
 SEAM_RINGS = 6  # quads on each side of a seam that do not tell how good a face is
-LARGE = 20_000  # quads of a face that is not meshed again for a quad that is not that bad
 CONTRADICTIONS = 6  # rounds in which chains are halved whose coarse outlines contradict each other
 
 
@@ -98,8 +97,8 @@ def mesh_faces(
         best = _better(best, _mesh_wide(graph, wide, 6, effort.wide, options, progress))
     wide = todo & (widest >= 4) & wide_faces(graph, 4, LEAST_WIDTH) & (rim >= EVEN[4]) & (best.worst < ENOUGH)
     best = _better(best, _mesh_wide(graph, wide, 4, effort.wide, options, progress))
-    enough = np.where(_large_faces(best), min(options.tuning.worst, effort.again_below), effort.again_below)
-    return _better(best, _mesh_at_stride(graph, todo & (best.worst < enough), 2, effort.narrow, options, progress))
+    poor = todo & (best.worst < effort.again_below)
+    return _better(best, _mesh_at_stride(graph, poor, 2, effort.narrow, options, progress))
 
 
 def _nothing(faces: Flags) -> Meshed:
@@ -120,12 +119,6 @@ def taken(one: Meshed, other: Meshed, which: Flags) -> Meshed:
     parts = faces_of(one.parts, ~which) + faces_of(other.parts, which)
     worst, stride, fell = (np.where(which, b, a) for a, b in zip(one[2:], other[2:], strict=True))
     return Meshed(parts, one.faces, worst, stride, fell)
-
-
-def _large_faces(meshed: Meshed) -> Flags:
-    """Return which faces have so many quads that they are not meshed again for one that is not that bad."""
-    faces = [np.empty(0, np.int64), *(part.face for part in meshed.parts)]
-    return np.asarray(np.bincount(np.concatenate(faces), minlength=len(meshed.faces)) > LARGE)
 
 
 def _mesh_wide(

@@ -12,33 +12,17 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import scipy
 
 from imgquad_core.arrays import Flags, Floats, Ints
-from imgquad_core.cleanup.faces import FaceQuads, faces_only, joined
-from imgquad_core.cleanup.irregular_nodes import clean_up
-from imgquad_core.cleanup.optimization import (
-    GOOD_ENOUGH,
-    LAPLACE_SWEEPS,
-    NEWTON_SWEEPS,
-    cut_at_chains,
-    stitched_onto,
-)
+from imgquad_core.cleanup.areas import Area, cleaned
 from imgquad_core.cleanup.options import CleanUp
-from imgquad_core.cleanup.relaxation import BAD, GOOD, laplace, newton, rings_of, untangle
 from imgquad_core.cleanup.strips import nodes_around
-from imgquad_core.cleanup.worst_quads import repair
-from imgquad_core.geometry.halfedge import twins_of
-from imgquad_core.geometry.quad_shape import lower_to_worst
-from imgquad_core.model import Materials
-from imgquad_core.tracing import trace_mesh
 
 from .grid import BAND, CLEAR, CORNER, Grid
 from .meshes import Patch, TileMesh, joined_meshes, part_of
 
 SEEDS = 8  #: quads from the seam within which irregular nodes are looked at
 PASSES = (CleanUp((40, 160, 600), 1.0, 0.6, 600), CleanUp((40, 160, 600, 1200), 1.0, 0.6, 600))
-POOR = 0.7  #: scaled Jacobian below which single quads are replaced, as in faces
 ROUNDS = ("down", "across", "corner")
 
 
@@ -108,7 +92,8 @@ def cleaned_band(
     _, region = np.unique(whole.region, return_inverse=True)
     beside = _in_several(region.ravel(), tile, int(region.max()) + 1)[region.ravel()]
     quads = np.flatnonzero(beside & nodes_around(whole.quads, seam, BAND - 1)[whole.quads].any(axis=1))
-    points, corners, region = cleaned(whole, quads, nodes_around(whole.quads, seam, SEEDS))
+    area = Area(whole.points, whole.quads, whole.region)
+    points, corners, region = cleaned(area, quads, nodes_around(whole.quads, seam, SEEDS), PASSES)
     centre = points[corners].mean(axis=1)
     column, row = centre[:, 0] // grid.tile, (grid.shape[0] - centre[:, 1]) // grid.tile
     owner = (row * grid.across + column).astype(np.int64)
@@ -130,73 +115,3 @@ def _in_several(what: Ints, tile: Ints, n: int) -> Flags:
     """Tell which of n things occur in several tiles."""
     n_tiles = int(tile.max(initial=0)) + 1
     return np.bincount(np.unique(what * n_tiles + tile) // n_tiles, minlength=n) > 1
-
-
-def cleaned(whole: TileMesh, quads: Ints, near: Flags) -> tuple[Floats, Ints, Ints]:
-    """Return points, quads and their regions that take the place of some quads, cleaned up from some nodes on."""
-    used, corners = np.unique(whole.quads[quads], return_inverse=True)
-    corners = corners.reshape(-1, 4)
-    regions, label = np.unique(whole.region[quads], return_inverse=True)
-    names = tuple(map(str, regions.tolist()))
-    materials = Materials(np.arange(len(regions), dtype=np.int32), names, np.zeros((len(regions), 3), np.uint8))
-    mesh = trace_mesh(whole.points[used], corners, label, materials)
-    old = _held(cut_at_chains(mesh), rim_of(whole, quads)[used], used)
-    seeds = near[used]
-    new = old
-    for how in PASSES:
-        new = _repaired(_relaxed(clean_up(_relaxed(new), how, _seeds(new, mesh.points, seeds))))
-    better = _is_better(old, new, len(mesh.region_label))
-    made = stitched_onto(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))
-    return np.asarray(made.points), np.asarray(made.quads), regions[made.quad_material]
-
-
-def rim_of(whole: TileMesh, quads: Ints) -> Flags:
-    """Tell the nodes where the band ends inside a region: they are held, with as many quads as they have."""
-    inside = np.zeros(len(whole.quads), bool)
-    inside[quads] = True
-    twins = twins_of(whole.quads, len(whole.points))
-    h = np.flatnonzero((twins >= 0) & np.repeat(inside, 4))
-    h = h[~inside[twins[h] // 4] & (whole.region[h // 4] == whole.region[twins[h] // 4])]
-    rim = np.zeros(len(whole.points), bool)
-    rim[whole.quads.ravel()[h]] = rim[np.roll(whole.quads, -1, axis=1).ravel()[h]] = True
-    return rim
-
-
-def _held(faces: FaceQuads, on_rim: Flags, used: Ints) -> FaceQuads:
-    """Let nodes where the band ends want the quads that they have."""
-    here = np.bincount(faces.quads.ravel(), minlength=len(faces.points))
-    held = (faces.origin >= 0) & on_rim[np.maximum(faces.origin, 0)]
-    return faces._replace(wanted=np.where(held, here, faces.wanted))
-
-
-def _seeds(faces: FaceQuads, points: Floats, near: Flags) -> Flags:
-    """Tell the nodes near the seam: by place, as old ones may be gone."""
-    if not near.any():
-        return np.zeros(len(faces.points), bool)
-    quads = faces.points[faces.quads]
-    edge = float(np.median(np.hypot(*(quads[:, 1] - quads[:, 0]).T)))
-    return np.asarray(scipy.spatial.cKDTree(points[near]).query(faces.points)[0] <= 1.25 * edge)
-
-
-def _relaxed(part: FaceQuads) -> FaceQuads:
-    points, free = part.points.copy(), part.origin < 0
-    rings = rings_of(part.quads, len(points))
-    laplace(points, rings, free, LAPLACE_SWEEPS)
-    untangle(points, rings, free, 2, BAD)
-    newton(points, rings, free, NEWTON_SWEEPS, GOOD)
-    untangle(points, rings, free, 4, 0.86)
-    return part._replace(points=points)
-
-
-def _repaired(part: FaceQuads) -> FaceQuads:
-    """Replace the worst quads: a face tells how good it is without those near seams, so they may be poor."""
-    better, beside = repair(part, POOR)
-    return _relaxed(better) if beside.any() else part
-
-
-def _is_better(old: FaceQuads, new: FaceQuads, n_faces: int) -> Flags:
-    """Tell the faces whose worst quad does not fall, or stays good."""
-    before, after = np.ones((2, n_faces))
-    lower_to_worst(old.points, old.quads, old.face, before)
-    lower_to_worst(new.points, new.quads, new.face, after)
-    return np.asarray((after >= np.minimum(before, GOOD_ENOUGH)) & (after > 0.0))

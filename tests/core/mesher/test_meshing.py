@@ -13,7 +13,7 @@ from imgquad_core.cleanup.faces import faces_only
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.measures.quality import quality_report
-from imgquad_core.mesher import meshing, refits, strides
+from imgquad_core.mesher import refits, strides
 from imgquad_core.mesher.efforts import EFFORTS, Tuning
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.mesher.options import MeshingOptions
@@ -79,72 +79,15 @@ def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None
     assert naive.worst_quality(mesh.points, mesh.quads) > 0.5
 
 
-@pytest.mark.parametrize("rounds", [1, Tuning().rounds])
-def test_edges_are_halved_beside_points_that_fold_quads(rounds: int) -> None:
+def test_edges_are_halved_beside_points_that_fold_quads() -> None:
     image = label_image(np.random.default_rng(5).integers(0, 3, (40, 40)))
     graph = boundaries(image, 5.0)
-    usual, options = Tuning(worst=0.5), MeshingOptions(size=5.0, effort="fast")
-    as_it_was = mesh_boundaries(graph, replace(options, tuning=usual._replace(worst=0.0)))
-    worst = usual.worst + 0.1  # so that something is worse
-    pickier = usual._replace(worst=worst, rounds=rounds, wishes=min(usual.wishes, rounds))
-    mesh = mesh_boundaries(graph, replace(options, tuning=pickier), image.materials)
-    assert_valid_mesh(mesh, image)
-    before, after = (naive.worst_quality(m.points, m.quads) for m in (as_it_was, mesh))
-    assert before < usual.worst < after
-    assert before + 0.02 < after
-    n, edges, finer = len(graph.points), np.diff(graph.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
-    assert mesh.points[:n].tobytes() == graph.points.tobytes()
-    assert (finer > edges).any()
-    assert (finer % 2 == 0).all()
-    if rounds == 1:
-        assert (finer == 2 * edges).all()
-
-
-def test_halved_edges_are_kept_where_they_make_the_worst_element_better(monkeypatch: pytest.MonkeyPatch) -> None:
-    y, x = np.mgrid[:60, :70]
-    image = label_image(((x + 4 * np.sin(y / 5)) // 10).astype(np.int32))  # wavy stripes
-    graph = boundaries(image, 4.0)
-    mesh_faces = strides.mesh_faces
-    first, last = int(graph.region_label.argmin()), int(graph.region_label.argmax())
-    rounds: list[set[int]] = []
-
-    def pretended(
-        graph: BoundaryGraph, todo: Any, options: MeshingOptions, widest: Any, _: object = None
-    ) -> strides.Meshed:
-        done = mesh_faces(graph, todo, options, widest)
-        worst = np.full(len(todo), 0.95)
-        worst[first], worst[last] = (0.95, 0.2) if rounds else (0.3, 0.3)
-        rounds.append(set(np.flatnonzero(todo).tolist()))
-        return done._replace(worst=worst)
-
-    as_it_was = mesh_boundaries(graph, MeshingOptions(size=4.0, effort="fast"))
-    monkeypatch.setattr(meshing, "mesh_faces", pretended)
-    monkeypatch.setattr(refits, "mesh_faces", pretended)
-    options = MeshingOptions(size=4.0, effort="fast", tuning=Tuning(worst=0.9))
-    mesh = mesh_boundaries(graph, options, image.materials)
-    assert_valid_mesh(mesh, image)
-    assert len(rounds) == Tuning().wishes + 1
-    assert {first, last} <= rounds[1]
-    assert all(last in todo and first not in todo for todo in rounds[2:])
-    edges, finer = np.diff(as_it_was.chain_offsets) - 1, np.diff(mesh.chain_offsets) - 1
-    beside, far = ((graph.chain_regions == face).any(axis=1) for face in (first, last))
-    assert (finer > edges)[beside].any()
-    assert np.array_equal(finer[far], edges[far])
-
-
-def test_a_wish_that_fails_leaves_the_valid_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
-    image = label_image(voronoi(60, 50, 9, 1))
-    graph = boundaries(image, 4.0)
-    options = MeshingOptions(size=4.0, effort="fast", tuning=Tuning(worst=0.0))
-    as_it_was = mesh_boundaries(graph, options)
-
-    def failing(*_: object) -> None:
-        raise TopologyError("no finer boundary")
-
-    monkeypatch.setattr(refits, "_refitted", failing)
-    mesh = mesh_boundaries(graph, replace(options, tuning=Tuning(worst=0.9)), image.materials)
-    assert mesh.points.tobytes() == as_it_was.points.tobytes()
-    assert_valid_mesh(mesh, image)
+    usual = Tuning()
+    halved = [refits._finer(graph, np.array([9]), k, usual) for k in range(usual.rounds)]
+    more = [len(finer.points) - len(graph.points) for finer in halved]
+    assert more == sorted(more)
+    assert more[0] in (2, 4, 8, 12)  # the segments around one point
+    assert more[-1] == (np.diff(graph.chain_offsets) - 1).sum()
 
 
 def test_every_face_has_quads_however_bad_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
