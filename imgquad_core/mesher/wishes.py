@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Flags, Floats, Ints
-from imgquad_core.chains import chain_of_places, near_segments, with_mid_points
+from imgquad_core.chains import chain_of_places, edges_of_chains, near_segments, with_mid_points
 from imgquad_core.cleanup.areas import Area
 from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.grouping import linked
@@ -24,6 +24,7 @@ from .options import MeshingOptions
 from .refilling import REACH, Fill, refilled, within
 from .strides import near_seams
 
+SMALL = 48  #: edges around a face all of which are halved where those that poor quads touch do not do
 FARTHEST = 3  #: segments before and after those that poor quads touch
 WIDTH = 1.5  #: of quads, in mean ones: few within `REACH` quads are farther away; such are left as they are
 
@@ -72,7 +73,7 @@ def _spots(mesh: QuadMesh, graph: BoundaryGraph, reach: int, limit: float) -> It
     """Find the places with poor quads, the worst one first; no edges are halved where `reach` is negative."""
     is_seam = mesh.point_kind == PointKind.SEAM
     poor, worst = poor_quads(mesh.points, mesh.quads, mesh.quad_region, is_seam, limit)
-    quad, node = _touched(mesh, graph, poor)
+    quad, node = _touched(mesh, graph, poor, reach)
     near = near_segments(graph, node[node < len(graph.points)], reach) if reach >= 0 else np.zeros(1, bool)
     places = np.flatnonzero(_may_be_halved(graph) & near)
     run = np.cumsum(np.diff(places, prepend=-2) > 1) - 1  # an entry without an edge lies between two chains
@@ -109,21 +110,35 @@ def poor_quads(points: Floats, quads: Ints, region: Ints, is_seam: Flags, limit:
     return poor, sj[poor]
 
 
-def _touched(mesh: QuadMesh, graph: BoundaryGraph, poor: Ints) -> tuple[Ints, Ints]:
-    """Return pairs of a poor quad, by its place among them, and a node: its own, and one of the boundary at least."""
-    corners = mesh.quads[poor]
-    alone = np.flatnonzero((corners >= len(graph.points)).all(axis=1))
-    nearest = [_nearest(mesh, graph, int(q)) for q in poor[alone]]
-    quad = np.repeat(np.arange(len(poor)), 4)
-    return np.append(quad, alone), np.append(corners.ravel(), np.array(nearest, np.int64))
+def _touched(mesh: QuadMesh, graph: BoundaryGraph, poor: Ints, reach: int) -> tuple[Ints, Ints]:
+    """Return pairs of a poor quad, by its place among them, and a node: its own, and one of the boundary at least.
+
+    Where more than what it touches is to be halved, all of a small face's boundary is.
+    """
+    corners, region = mesh.quads[poor], mesh.quad_region[poor]
+    is_small = _edges_around(graph)[region] <= (SMALL if reach > 0 else 0)
+    is_alone = (corners >= len(graph.points)).all(axis=1)
+    quads, nodes = [np.repeat(np.arange(len(poor)), 4)], [corners.ravel()]
+    for k in np.flatnonzero(is_small | is_alone):
+        beside = (graph.chain_regions == region[k]).any(axis=1)
+        rim = np.unique(graph.chain_points[beside[chain_of_places(graph)]])
+        more = rim if is_small[k] else _nearest(graph, rim, mesh.points[corners[k]].mean(axis=0))
+        quads.append(np.full(len(more), k))
+        nodes.append(more)
+    return np.concatenate(quads), np.concatenate(nodes)
 
 
-def _nearest(mesh: QuadMesh, graph: BoundaryGraph, quad: int) -> int:
-    """Return the node of a face's boundary that is nearest to a quad, one that nobody holds if there is any."""
-    beside = (graph.chain_regions == mesh.quad_region[quad]).any(axis=1)
-    nodes = np.unique(graph.chain_points[beside[chain_of_places(graph)]])
-    gaps = np.hypot(*(graph.points[nodes] - mesh.points[mesh.quads[quad]].mean(axis=0)).T)
-    return int(nodes[np.lexsort((gaps, graph.point_kind[nodes] >= PointKind.HELD))[0]])
+def _edges_around(graph: BoundaryGraph) -> Ints:
+    """Return the number of edges around each face."""
+    counts = np.zeros(len(graph.region_label) + 1, np.int64)  # VOID is the last entry
+    np.add.at(counts, graph.chain_regions, edges_of_chains(graph)[:, None])
+    return counts[:-1]
+
+
+def _nearest(graph: BoundaryGraph, nodes: Ints, place: Floats) -> Ints:
+    """Return the one of some nodes that is nearest to a place, one that nobody holds if there is any."""
+    gaps = np.hypot(*(graph.points[nodes] - place).T)
+    return nodes[np.lexsort((gaps, graph.point_kind[nodes] >= PointKind.HELD))[:1]]
 
 
 def _may_be_halved(graph: BoundaryGraph) -> Flags:
