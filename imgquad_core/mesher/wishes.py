@@ -138,7 +138,8 @@ def _edges_around(graph: BoundaryGraph) -> Ints:
 def _nearest(graph: BoundaryGraph, nodes: Ints, place: Floats) -> Ints:
     """Return the one of some nodes that is nearest to a place, one that nobody holds if there is any."""
     gaps = np.hypot(*(graph.points[nodes] - place).T)
-    return nodes[np.lexsort((gaps, graph.point_kind[nodes] >= PointKind.HELD))[:1]]
+    nearest: Ints = nodes[np.lexsort((gaps, graph.point_kind[nodes] >= PointKind.HELD))[:1]]
+    return nearest
 
 
 def _may_be_halved(graph: BoundaryGraph) -> Flags:
