@@ -19,6 +19,7 @@ from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.model import Materials
 from imgquad_core.tracing import trace_mesh
 
+from .batches import in_batches
 from .faces import FaceQuads, faces_only, joined
 from .irregular_nodes import clean_up
 from .optimization import GOOD_ENOUGH, LAPLACE_SWEEPS, NEWTON_SWEEPS, cut_at_chains, stitched_onto
@@ -38,7 +39,7 @@ class Area(NamedTuple):
     part: Ints  #: (m,) what each is of: there is a boundary between two parts
 
 
-def cleaned(area: Area, quads: Ints, near: Flags, passes: Sequence[CleanUp]) -> Area:
+def cleaned(area: Area, quads: Ints, near: Flags, passes: Sequence[CleanUp], threads: int = 1) -> Area:
     """Clean up quads of an area from some nodes on.
 
     Parameters
@@ -51,6 +52,8 @@ def cleaned(area: Area, quads: Ints, near: Flags, passes: Sequence[CleanUp]) -> 
         Nodes from which irregular nodes are looked at, within some edges.
     passes : sequence of CleanUp
         One after the other.
+    threads : int
+        The quads do not depend on it.
 
     Returns
     -------
@@ -61,9 +64,14 @@ def cleaned(area: Area, quads: Ints, near: Flags, passes: Sequence[CleanUp]) -> 
     parts, number = np.unique(area.part[quads], return_inverse=True)
     mesh = trace_mesh(area.points[used], corners.reshape(-1, 4), number.ravel(), nameless(len(parts)))
     old = _held(cut_at_chains(mesh), rim_of(area, quads)[used])
-    new = old
-    for how in passes:
-        new = _repaired(_relaxed(clean_up(_drafted(new), how, _seeds(new, mesh.points, near[used]))))
+    seeds = mesh.points[near[used]]
+
+    def clean(part: FaceQuads) -> FaceQuads:
+        for how in passes:
+            part = _repaired(_relaxed(clean_up(_drafted(part), how, _near(part, seeds))))
+        return part
+
+    new = joined(in_batches(old, clean, threads))
     better = _is_better(old, new, len(mesh.region_label))
     made = stitched_onto(mesh, joined([faces_only(old, ~better), faces_only(new, better)]))
     rim = used[np.unique(mesh.chain_points)]  # they come first
@@ -96,11 +104,11 @@ def _held(faces: FaceQuads, on_rim: Flags) -> FaceQuads:
     return faces._replace(wanted=np.where(held, here, faces.wanted))
 
 
-def _seeds(faces: FaceQuads, points: Floats, near: Flags) -> Flags:
-    """Tell the nodes near some points: by place, in cells two edges wide, as old ones may be gone."""
+def _near(faces: FaceQuads, places: Floats) -> Flags:
+    """Tell the nodes near some places, in cells two edges wide: old ones may be gone."""
     corners = faces.points[faces.quads]
     side = 2.0 * float(np.median(np.hypot(*(corners[:, 1] - corners[:, 0]).T)))
-    cells, there = (np.floor(xy / side).astype(np.int64) for xy in (faces.points, points[near]))
+    cells, there = (np.floor(xy / side).astype(np.int64) for xy in (faces.points, places))
     return np.isin(cells[:, 0] * WIDE + cells[:, 1], there[:, 0] * WIDE + there[:, 1])
 
 

@@ -44,7 +44,7 @@ class _Cut(NamedTuple):
     moved: Floats  #: (n_faces, 2) by which each face has been
 
 
-def refilled(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill) -> Area | None:
+def refilled(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill, threads: int) -> Area | None:
     """Fill anew what lies near some quads, with edges of the boundary halved.
 
     Parameters
@@ -59,6 +59,8 @@ def refilled(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill) -
         Material of each part.
     fill : callable
         Fills a boundary.
+    threads : int
+        The quads do not depend on it.
 
     Returns
     -------
@@ -79,7 +81,7 @@ def refilled(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill) -
     face[mesh.quads] = mesh.quad_region[:, None]
     points = np.vstack([area.points, middle, (mesh.points - cut.moved[face])[rim:]])
     new = Area(points, ids[mesh.quads], cut.part[mesh.quad_region])
-    return _cleaned_around(*replaced(area, gone, new))
+    return _cleaned_around(*replaced(area, gone, new), threads)
 
 
 def replaced(area: Area, gone: Ints, new: Area) -> tuple[Area, Ints]:
@@ -89,14 +91,14 @@ def replaced(area: Area, gone: Ints, new: Area) -> tuple[Area, Ints]:
     return Area(new.points, np.concatenate([quads, new.quads]), np.concatenate([part, new.part])), at
 
 
-def _cleaned_around(area: Area, new: Ints) -> Area:
+def _cleaned_around(area: Area, new: Ints, threads: int) -> Area:
     """Clean up across the rim of quads that were filled anew."""
     rim = rim_of(area, new)
     if not rim.any():
         return area
     of_parts = np.isin(area.part, np.unique(area.part[new]))
     quads = np.flatnonzero(of_parts & nodes_around(area.quads, rim, BAND - 1)[area.quads].any(axis=1))
-    return replaced(area, quads, cleaned(area, quads, nodes_around(area.quads, rim, SEEDS), PASSES))[0]
+    return replaced(area, quads, cleaned(area, quads, nodes_around(area.quads, rim, SEEDS), PASSES, threads))[0]
 
 
 def _beside(area: Area, ends: Ints) -> Flags:

@@ -54,7 +54,7 @@ def with_wishes(mesh: QuadMesh, shape: tuple[int, int], fill: Fill, options: Mes
     for attempt in range(options.tuning.wishes):
         graph = _graph_of(mesh, shape)
         spots = _apart(_spots(mesh, graph, min(attempt - 1, FARTHEST), options.tuning.worst), mesh.n_quads)
-        tried = _tried(mesh, graph, spots, fill) if spots else []
+        tried = _tried(mesh, graph, spots, fill, options.n_threads) if spots else []
         if any(found.better.any() for found in tried):
             mesh = _with_better(mesh, graph, tried)
         elif attempt > FARTHEST or not spots:
@@ -209,7 +209,7 @@ class _Tried(NamedTuple):
     better: Flags  #: whether the worst quad of each spot is
 
 
-def _tried(mesh: QuadMesh, graph: BoundaryGraph, spots: list[Spot], fill: Fill) -> list[_Tried]:
+def _tried(mesh: QuadMesh, graph: BoundaryGraph, spots: list[Spot], fill: Fill, threads: int) -> list[_Tried]:
     """Fill anew what is near spots: all at once, or in halves where that fails."""
     quads = np.concatenate([spot.quads for spot in spots])
     which = np.repeat(np.arange(len(spots)), [len(spot.quads) for spot in spots])
@@ -220,10 +220,12 @@ def _tried(mesh: QuadMesh, graph: BoundaryGraph, spots: list[Spot], fill: Fill) 
     places = np.sort(np.concatenate([spot.places for spot in spots]))
     ends = np.stack([graph.chain_points[places], graph.chain_points[places + 1]], axis=1)
     begin = np.isin(quads, np.concatenate([spot.poor for spot in spots]))
-    new = refilled(old, begin, np.searchsorted(used, ends), mesh.region_label[region], fill)
+    new = refilled(old, begin, np.searchsorted(used, ends), mesh.region_label[region], fill, threads)
     if new is None:
         half = len(spots) // 2
-        return [found for some in (spots[:half], spots[half:]) if half for found in _tried(mesh, graph, some, fill)]
+        return [
+            found for some in (spots[:half], spots[half:]) if half for found in _tried(mesh, graph, some, fill, threads)
+        ]
     before, after = np.ones((2, len(spots)))
     lower_to_worst(old.points, old.quads, of_part[old.part], before)
     lower_to_worst(new.points, new.quads, of_part[new.part], after)
