@@ -73,6 +73,8 @@ def _spots(mesh: QuadMesh, graph: BoundaryGraph, reach: int, limit: float) -> It
     """Find the places with poor quads, the worst one first; no edges are halved where `reach` is negative."""
     is_seam = mesh.point_kind == PointKind.SEAM
     poor, worst = poor_quads(mesh.points, mesh.quads, mesh.quad_region, is_seam, limit)
+    if not len(poor):
+        return
     quad, node = _touched(mesh, graph, poor, reach)
     near = near_segments(graph, node[node < len(graph.points)], reach) if reach >= 0 else np.zeros(1, bool)
     places = np.flatnonzero(_may_be_halved(graph) & near)
@@ -85,7 +87,9 @@ def _spots(mesh: QuadMesh, graph: BoundaryGraph, reach: int, limit: float) -> It
     edge = float(np.sqrt(np.mean(quad_areas(mesh.points, mesh.quads))))
     cells = _Cells.of(mesh, graph.shape, REACH * WIDTH * edge)
     at, of = (_rows(each, len(group)) for each in (group[run], group[n_runs:]))
-    for g in np.argsort(least[: group.max(initial=-1) + 1], kind="stable"):
+    for g in np.argsort(least, kind="stable"):
+        if least[g] == 1.0:  # there is no such group, or no poor quad in it
+            break
         yield _spot(mesh, graph, places[at[g]], poor[of[g]], cells)
 
 
