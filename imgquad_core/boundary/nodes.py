@@ -17,9 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imgquad_core.arrays import Bytes, Flags, Floats, Ints
-from imgquad_core.chains import places_of
 from imgquad_core.geometry.conflicts import CROSSING, SHARP, find_conflicts
-from imgquad_core.grouping import rows_of
 from imgquad_core.jit import kernel, verb
 
 from .curves import Curves, Ends, numbered
@@ -42,29 +40,56 @@ def mark_sharp(
     marks: Bytes,
 ) -> None:
     """Mark the segments on both sides of sectors of less than `least` radians (below a right angle), in place."""
-    places = places_of(chain_points, offsets)
-    first = offsets[:-1] - np.arange(len(offsets) - 1)  # segments of each chain
-    last = offsets[1:] - 2 - np.arange(len(offsets) - 1)
-    previous = np.arange(len(marks)) - 1
-    previous[first] = last
-    is_sharp = _is_sharp(points, places.here, places.before, places.after, least)
-    is_sharp[first] &= chain_points[offsets[:-1]] == chain_points[offsets[1:] - 1]
-    sharp = [np.flatnonzero(is_sharp), previous[is_sharp]]
-    node = rows_of(node_offsets)
-    segment = np.where(sockets % 2, last[sockets // 2], first[sockets // 2])
-    far = np.where(sockets % 2, places.here[segment], places.after[segment])
-    for step in range(1, int(np.diff(node_offsets).max(initial=0))):
-        a = np.flatnonzero(node[step:] == node[:-step])
-        a = a[_is_sharp(points, node[a], far[a], far[a + step], least)]
-        sharp += [segment[a], segment[a + step]]
-    found = np.concatenate(sharp)
-    marks[found] = np.maximum(marks[found], SHARP)
+    _mark_sectors(points, chain_points, offsets, node_offsets, sockets, float(np.tan(least)), marks)
 
 
-def _is_sharp(points: Floats, v: Ints, p: Ints, q: Ints, least: float) -> Flags:
-    """Tell where the angle between the segments from v to p and to q is less than `least`."""
-    (ux, uy), (wx, wy) = (points[p] - points[v]).T, (points[q] - points[v]).T
-    return np.asarray(np.abs(ux * wy - uy * wx) < np.tan(least) * (ux * wx + uy * wy))
+@kernel
+def _mark_sectors(
+    points: Floats,
+    chain_points: Ints,
+    offsets: Ints,
+    node_offsets: Ints,
+    sockets: Ints,
+    tangent: float,
+    marks: Bytes,
+) -> None:
+    for c in range(len(offsets) - 1):
+        first, last = offsets[c], offsets[c + 1] - 1
+        is_open = chain_points[first] != chain_points[last]
+        for i in range(first + is_open, last):
+            before = i - 1 if i > first else last - 1
+            if _is_sharp(points, chain_points[i], chain_points[before], chain_points[i + 1], tangent):
+                _mark_sharp(marks, i - c)
+                _mark_sharp(marks, before - c)
+    for v in range(len(node_offsets) - 1):
+        for k in range(node_offsets[v], node_offsets[v + 1]):
+            mine, p = _segment_at(chain_points, offsets, sockets[k])
+            for j in range(k + 1, node_offsets[v + 1]):
+                other, q = _segment_at(chain_points, offsets, sockets[j])
+                if _is_sharp(points, v, p, q, tangent):
+                    _mark_sharp(marks, mine)
+                    _mark_sharp(marks, other)
+
+
+@verb
+def _segment_at(chain_points: Ints, offsets: Ints, socket: int) -> tuple[int, int]:
+    """Return the segment at an end of a chain, and the point that it leads to."""
+    c, is_end = socket // 2, socket % 2
+    at = offsets[c + 1] - 2 if is_end else offsets[c]
+    return at - c, chain_points[at + 1 - is_end]
+
+
+@verb
+def _mark_sharp(marks: Bytes, segment: int) -> None:
+    marks[segment] = max(marks[segment], SHARP)
+
+
+@verb
+def _is_sharp(points: Floats, v: int, p: int, q: int, tangent: float) -> bool:
+    """Tell whether the angle between the segments from v to p and to q is below that of a tangent."""
+    ux, uy = points[p, 0] - points[v, 0], points[p, 1] - points[v, 1]
+    wx, wy = points[q, 0] - points[v, 0], points[q, 1] - points[v, 1]
+    return bool(abs(ux * wy - uy * wx) < tangent * (ux * wx + uy * wy))
 
 
 class Placement(NamedTuple):
@@ -271,7 +296,8 @@ def mark_conflicts(
     """
     marks = find_conflicts(points, strided.segments, strided.chain, is_new, shape, units)
     beyond = np.abs(2.0 * points - shape[::-1]) > np.array(shape[::-1]) + 4.0 / units  # rounded to steps of the grid
-    marks[beyond.any(axis=1)[strided.segments].any(axis=1)] = CROSSING  # past void nothing else is crossed
+    if beyond.any():
+        marks[beyond.any(axis=1)[strided.segments].any(axis=1)] = CROSSING  # past void nothing else is crossed
     if gently:
         mark_sectors(points, strided, ends, marks)
     else:

@@ -55,47 +55,69 @@ def find_conflicts(
     marks = np.zeros(len(segments), np.uint8)
     points = np.require(points, requirements="W")  # kernels are compiled once more for a read-only array
     if len(segments):
-        lengths = np.hypot(*(points[segments[:, 1]] - points[segments[:, 0]]).T)
-        cell = max(float(lengths.mean()), float(np.sqrt(shape[0] * shape[1] / (4.0 * len(segments)))))
+        cell = max(_mean_length(points, segments), float(np.sqrt(shape[0] * shape[1] / (4.0 * len(segments)))))
         n_across, n_up = int(shape[1] / cell) + 1, int(shape[0] / cell) + 1
-        start, items = _bucket_segments(points, segments, cell, n_across, n_up)
+        start, items = _bucket_segments(points, segments, chain, is_new, cell, n_across, n_up)
         grid = np.round(points * units).astype(np.int64)
         _compare_in_cells(grid, points, segments, chain, is_new, start, items, marks)
-        marks[(points[segments[:, 0]] == points[segments[:, 1]]).all(axis=1)] = CROSSING
     return marks
 
 
 @kernel
-def _bucket_segments(points: Floats, segments: Ints, cell: float, n_across: int, n_up: int) -> tuple[Ints, Ints]:
-    """Sort segments into the cells of boxes around pieces of them, at most a cell long, and the room they need."""
+def _mean_length(points: Floats, segments: Ints) -> float:
+    total = 0.0
+    for k in range(len(segments)):
+        dx = points[segments[k, 1], 0] - points[segments[k, 0], 0]
+        dy = points[segments[k, 1], 1] - points[segments[k, 0], 1]
+        total += np.sqrt(dx * dx + dy * dy)
+    return float(total / len(segments))
+
+
+@kernel
+def _bucket_segments(
+    points: Floats, segments: Ints, chain: Ints, is_new: Flags, cell: float, n_across: int, n_up: int
+) -> tuple[Ints, Ints]:
+    """Sort segments into the cells of boxes around pieces of them, at most a cell long, and the room they need.
+
+    Short ones that are far from all new ones are left out.
+    """
     start = np.zeros(n_across * n_up + 1, np.int64)
+    is_near, inverse = np.full(n_across * n_up, is_new.all()), 1.0 / cell
     items = np.empty(0, np.int64)
-    for fill in range(2):
+    for step in range(1 if is_new.all() else 0, 3):  # cells at and beside new segments; counts; the segments
         for k in range(len(segments)):
+            if step == 0 and not is_new[chain[k]]:
+                continue
             ax, ay = points[segments[k, 0], 0], points[segments[k, 0], 1]
             dx, dy = points[segments[k, 1], 0] - ax, points[segments[k, 1], 1] - ay
-            pieces = int(max(abs(dx), abs(dy)) / cell) + 1
-            margin = _ROOM * np.sqrt(dx * dx + dy * dy)
+            pieces = int(max(abs(dx), abs(dy)) * inverse) + 1
+            if step > 0 and pieces == 1:  # all its cells are at or beside that of its middle
+                row = min(max(int((ay + 0.5 * dy) * inverse), 0), n_up - 1)
+                if not is_near[row * n_across + min(max(int((ax + 0.5 * dx) * inverse), 0), n_across - 1)]:
+                    continue
+            share, margin = 1.0 / pieces, _ROOM * np.sqrt(dx * dx + dy * dy)
             done_left = done_right = done_low = done_high = -1
             for p in range(pieces):
-                x0, x1 = ax + dx * p / pieces, ax + dx * (p + 1) / pieces
-                y0, y1 = ay + dy * p / pieces, ay + dy * (p + 1) / pieces
-                left = max(int((min(x0, x1) - margin) / cell), 0)
-                right = min(int((max(x0, x1) + margin) / cell), n_across - 1)
-                low = max(int((min(y0, y1) - margin) / cell), 0)
-                high = min(int((max(y0, y1) + margin) / cell), n_up - 1)
+                x0, x1 = ax + share * p * dx, ax + share * (p + 1) * dx
+                y0, y1 = ay + share * p * dy, ay + share * (p + 1) * dy
+                left = max(int((min(x0, x1) - margin) * inverse) - (step == 0), 0)
+                right = min(int((max(x0, x1) + margin) * inverse) + (step == 0), n_across - 1)
+                low = max(int((min(y0, y1) - margin) * inverse) - (step == 0), 0)
+                high = min(int((max(y0, y1) + margin) * inverse) + (step == 0), n_up - 1)
                 for row in range(low, high + 1):
                     for column in range(left, right + 1):
                         if done_left <= column <= done_right and done_low <= row <= done_high:
                             continue
                         at = row * n_across + column
-                        if fill:
+                        if step == 0:
+                            is_near[at] = True
+                        elif step == 1:
+                            start[at] += 1
+                        else:
                             start[at] -= 1
                             items[start[at]] = k
-                        else:
-                            start[at] += 1
                 done_left, done_right, done_low, done_high = left, right, low, high
-        if not fill:
+        if step == 1:
             add_up(start)
             items = np.empty(start[-1], np.int64)
     return start, items
@@ -112,8 +134,11 @@ def _compare_in_cells(
     items: Ints,
     marks: Bytes,
 ) -> None:
+    for k in range(len(segments)):
+        if _is_point(points, segments[k, 0], segments[k, 1]):
+            marks[k] = CROSSING
     for at in range(len(start) - 1):
-        for i in range(start[at], start[at + 1] if _any_new(chain, is_new, items, start[at], start[at + 1]) else 0):
+        for i in range(start[at], start[at + 1]):
             k = items[i]
             for j in range(i + 1, start[at + 1]):
                 other = items[j]
@@ -132,11 +157,8 @@ def _raise(marks: Bytes, k: int, mark: int) -> None:
 
 
 @verb
-def _any_new(chain: Ints, is_new: Flags, items: Ints, low: int, high: int) -> bool:
-    for i in range(low, high):
-        if is_new[chain[items[i]]]:
-            return True
-    return False
+def _is_point(points: Floats, a: int, b: int) -> bool:
+    return bool(points[a, 0] == points[b, 0] and points[a, 1] == points[b, 1])
 
 
 @verb
