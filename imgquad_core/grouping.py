@@ -14,7 +14,7 @@ def rows_of(offsets: Ints, gaps: bool = False) -> Ints:
 
 
 @verb
-def add_up(counts: Ints) -> None:
+def add_up(counts: Ints | Labels) -> None:
     """Replace counts by their running sum."""
     for k in range(1, len(counts)):
         counts[k] += counts[k - 1]

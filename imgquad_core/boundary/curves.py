@@ -102,16 +102,19 @@ def on_frame(graph: BoundaryGraph) -> Flags:
     return np.asarray(graph.point_kind[graph.chain_points[graph.chain_offsets[:-1] + 1]] == PointKind.FRAME)
 
 
+@kernel
 def numbered(offsets: Ints, node: Ints, n_nodes: int) -> Ints:
     """Give ids to the points of chains between nodes, shape (n_chains, 2), -1 closed: nodes first, others in order."""
-    is_closed = node[:, 0] < 0
-    is_inner = np.ones(offsets[-1], bool)
-    is_inner[offsets[:-1][~is_closed]] = False
-    is_inner[offsets[1:] - 1] = False
-    ids = np.empty(len(is_inner), np.int64)
-    ids[is_inner] = n_nodes + np.arange(np.count_nonzero(is_inner))
-    ids[offsets[:-1][~is_closed]], ids[offsets[1:][~is_closed] - 1] = node[~is_closed].T
-    ids[offsets[1:][is_closed] - 1] = ids[offsets[:-1][is_closed]]
+    ids, new = np.empty(offsets[-1], np.int64), n_nodes
+    for c in range(len(node)):
+        first, last = offsets[c], offsets[c + 1] - 1
+        is_open = node[c, 0] >= 0
+        for i in range(first + is_open, last):
+            ids[i] = new
+            new += 1
+        if is_open:
+            ids[first] = node[c, 0]
+        ids[last] = node[c, 1] if is_open else ids[first]
     return ids
 
 
@@ -161,16 +164,27 @@ def sample_weights(side: Ints, offsets: Ints) -> Floats:
     return weight
 
 
+@kernel
 def pin_ends(points: Floats, curves: Curves, node: Floats) -> None:
     """Put chain ends on their nodes, in place; chains on the border become straight between theirs."""
-    first, last = curves.offsets[:-1], curves.offsets[1:] - 1
-    is_open = curves.ends[:, 0] >= 0
-    points[last[~is_open]] = points[first[~is_open]]
-    on_frame = np.flatnonzero(per_point(curves, is_open & curves.is_frame))
-    c = np.searchsorted(curves.offsets, on_frame, side="right") - 1
-    start, end = node[curves.ends[c, 0]], node[curves.ends[c, 1]]
-    points[on_frame] = start + (curves.arc[on_frame] / curves.arc[last[c]])[:, None] * (end - start)
-    points[first[is_open]], points[last[is_open]] = node[curves.ends[is_open, 0]], node[curves.ends[is_open, 1]]
+    for c in range(len(curves.ends)):
+        pin(curves, node, c, points)
+
+
+@verb
+def pin(curves: Curves, node: Floats, c: int, points: Floats) -> None:
+    """Do this for one chain."""
+    first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+    start, end = curves.ends[c, 0], curves.ends[c, 1]
+    for k in range(2):
+        if start < 0:
+            points[last, k] = points[first, k]
+            continue
+        if curves.is_frame[c]:
+            for i in range(first, last):
+                share = curves.arc[i] / curves.arc[last]
+                points[i, k] = node[start, k] + share * (node[end, k] - node[start, k])
+        points[first, k], points[last, k] = node[start, k], node[end, k]
 
 
 def per_point(curves: Curves, values: NDArray[Any]) -> NDArray[Any]:

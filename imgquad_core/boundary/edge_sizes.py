@@ -79,17 +79,35 @@ def grade(
     return grade_chains(size, curves, int(curves.ends.max(initial=-1)) + 1, edge_ratio)
 
 
-def grade_chains(size: Floats, curves: Curves, n_nodes: int, edge_ratio: float) -> Floats:
-    """Limit how fast `size` grows along the chains, and past their ends."""
-    is_open = curves.ends[:, 0] >= 0
-    node = curves.ends[is_open].ravel()
-    place = np.stack([curves.offsets[:-1], curves.offsets[1:] - 1], axis=1)[is_open].ravel()
-    for _ in range(_PAST_ENDS):
-        size = grade_along(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
-        least = np.full(n_nodes, np.inf)
-        np.minimum.at(least, node, size[place])
-        size[place] = least[node]
-    return grade_along(size, curves.arc, curves.offsets, curves.ends, np.log(edge_ratio))
+def grade_chains(
+    size: Floats, curves: Curves, n_nodes: int, edge_ratio: float, is_graded: Flags | None = None
+) -> Floats:
+    """Limit how fast `size` grows along the chains, and past their ends; some may be as this left them."""
+    is_graded = np.zeros(len(curves.ends), bool) if is_graded is None else is_graded
+    return _grade_chains(size, curves, np.empty(n_nodes), float(np.log(edge_ratio)), is_graded)
+
+
+@kernel
+def _grade_chains(size: Floats, curves: Curves, least: Floats, slope: float, is_graded: Flags) -> Floats:
+    """Do so; `least` is room for the least size at each node."""
+    offsets, ends = curves.offsets, curves.ends
+    size, is_graded = size.copy(), is_graded.copy()
+    for k in range(_PAST_ENDS + 1):
+        for v in range(len(least)):
+            least[v] = np.inf
+        for c in range(len(ends)):
+            if not is_graded[c]:
+                _grade_chain(size, curves.arc, offsets[c], offsets[c + 1] - 1, ends[c, 0] < 0, slope)
+            is_graded[c] = True
+            if ends[c, 0] >= 0:
+                least[ends[c, 0]] = min(least[ends[c, 0]], size[offsets[c]])
+                least[ends[c, 1]] = min(least[ends[c, 1]], size[offsets[c + 1] - 1])
+        for c in range(len(ends) if k < _PAST_ENDS else 0):
+            if ends[c, 0] >= 0:
+                first, last = offsets[c], offsets[c + 1] - 1
+                is_graded[c] = size[first] == least[ends[c, 0]] and size[last] == least[ends[c, 1]]
+                size[first], size[last] = least[ends[c, 0]], least[ends[c, 1]]
+    return size
 
 
 @kernel
@@ -157,13 +175,17 @@ def grade_along(values: Floats, arc: Floats, offsets: Ints, ends: Ints, slope: f
     """Limit values so that they grow by no more than `slope` times the arc along each chain."""
     values = values.copy()
     for c in range(len(offsets) - 1):
-        first, last = offsets[c], offsets[c + 1] - 1
-        for _ in range(1 if ends[c, 0] >= 0 else 2):  # a closed chain needs the second round
-            if ends[c, 0] < 0:
-                values[first] = min(values[first], values[last])
-                values[last] = values[first]
-            for i in range(first + 1, last + 1):
-                values[i] = min(values[i], values[i - 1] + slope * (arc[i] - arc[i - 1]))
-            for i in range(last - 1, first - 1, -1):
-                values[i] = min(values[i], values[i + 1] + slope * (arc[i + 1] - arc[i]))
+        _grade_chain(values, arc, offsets[c], offsets[c + 1] - 1, ends[c, 0] < 0, slope)
     return values
+
+
+@verb
+def _grade_chain(values: Floats, arc: Floats, first: int, last: int, is_closed: bool, slope: float) -> None:
+    for _ in range(2 if is_closed else 1):  # a closed chain needs the second round
+        if is_closed:
+            values[first] = min(values[first], values[last])
+            values[last] = values[first]
+        for i in range(first + 1, last + 1):
+            values[i] = min(values[i], values[i - 1] + slope * (arc[i] - arc[i - 1]))
+        for i in range(last - 1, first - 1, -1):
+            values[i] = min(values[i], values[i + 1] + slope * (arc[i + 1] - arc[i]))

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Floats, Ints
-from imgquad_core.grouping import grouped, rows_of
+from imgquad_core.arrays import Floats, Ints, Labels
+from imgquad_core.grouping import add_up, rows_of
 from imgquad_core.jit import kernel, verb
 from imgquad_core.threads import even_parts, in_threads
 
@@ -27,8 +27,8 @@ _REACH = 4.0
 class Buckets(NamedTuple):
     """Points in square cells, row by row: cell k has ``items[start[k]:start[k + 1]]``."""
 
-    start: Ints
-    items: Ints  #: ids of points
+    start: Labels
+    items: Labels  #: ids of points
     n_across: int  #: cells in a row
     cell: float  #: side of a cell, px
 
@@ -93,9 +93,20 @@ def _every(offsets: Ints, stride: int) -> Ints:
 def bucket(points: Floats, ids: Ints, cell: float) -> Buckets:
     """Sort the points `ids` into square cells."""
     n_across, n_up = (points.max(axis=0) / cell).astype(np.int64) + 1
-    column, row = (points[ids] / cell).astype(np.int64).T
-    start, places = grouped((row * n_across + column)[:, None], n_across * n_up)
-    return Buckets(start, ids[places], int(n_across), cell)
+    return Buckets(*_bucket(points, ids, cell, int(n_across), int(n_up)), int(n_across), cell)
+
+
+@kernel
+def _bucket(points: Floats, ids: Ints, cell: float, n_across: int, n_up: int) -> tuple[Labels, Labels]:
+    start, items = np.zeros(n_across * n_up + 1, np.int32), np.empty(len(ids), np.int32)
+    for i in ids:
+        start[int(points[i, 1] / cell) * n_across + int(points[i, 0] / cell)] += 1
+    add_up(start)
+    for k in range(len(ids) - 1, -1, -1):
+        at = int(points[ids[k], 1] / cell) * n_across + int(points[ids[k], 0] / cell)
+        start[at] -= 1
+        items[start[at]] = ids[k]
+    return start, items
 
 
 @verb

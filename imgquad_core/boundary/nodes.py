@@ -12,6 +12,7 @@ by the paper's move, `even_out`, on the curve itself and in whatever direction i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -100,6 +101,14 @@ class Placement(NamedTuple):
     is_corner: Flags
 
 
+def joined(parts: Sequence[Placement]) -> Placement:
+    """Join the placements of some chains and those that follow them."""
+    begins = np.cumsum([0, *(part.offsets[-1] for part in parts)]).tolist()
+    offsets = [part.offsets[:-1] + begin for part, begin in zip(parts, begins[:-1], strict=True)]
+    at, is_corner = (np.concatenate(arrays) for arrays in list(zip(*parts, strict=True))[1:])
+    return Placement(np.append(np.concatenate(offsets), begins[-1]), at, is_corner)
+
+
 @kernel
 def place_nodes(
     curves: Curves,
@@ -110,7 +119,7 @@ def place_nodes(
     exact: Flags,
     edge_multiple: int,
 ) -> Placement:
-    """Place the final nodes on every chain.
+    """Place the final nodes on every chain; `curves` may have the offsets of some chains only.
 
     Parameters
     ----------
@@ -132,17 +141,16 @@ def place_nodes(
     Placement
         An even number of final edges for every piece between corners.
     """
-    cost = np.zeros(len(size))
+    cost = np.empty(len(size))
     n_nodes = 0
     for c in range(len(exact)):
+        cost[curves.offsets[c]] = 0.0
         for i in range(curves.offsets[c] + 1, curves.offsets[c + 1]):
             step = max(curves.arc[i] - curves.arc[i - 1], 1e-9)
             cost[i] = cost[i - 1] + 2 * step / (size[i] + size[i - 1])
-            n_nodes += 2
-        n_nodes += 8 + int(cost[curves.offsets[c + 1] - 1]) * 2
+            n_nodes += 2 + 16 * is_corner[i]
+        n_nodes += 24 + int(cost[curves.offsets[c + 1] - 1]) * 2
     offsets = np.zeros(len(exact) + 1, np.int64)
-    for c in range(len(is_corner)):
-        n_nodes += 16 * is_corner[c]
     at = np.empty(n_nodes)
     corner = np.zeros(len(at), np.bool_)
     for c in range(len(exact)):
@@ -203,10 +211,13 @@ def _point(points: Floats, at: float) -> tuple[float, float]:
     )
 
 
+@kernel
 def points_at(points: Floats, at: Floats) -> Floats:
     """Points of the curves at fractional indices."""
-    i = np.minimum(at.astype(np.int64), len(points) - 2)
-    return np.asarray(points[i] + (at - i)[:, None] * (points[i + 1] - points[i]))
+    found = np.empty((len(at), 2))
+    for k in range(len(at)):
+        found[k, 0], found[k, 1] = _point(points, at[k])
+    return found
 
 
 @kernel
@@ -274,17 +285,26 @@ def number_nodes(curves: Curves, n_ends: int, xy: Floats, placed: Placement) -> 
 
 def on_stride(nodes: Nodes, step: int) -> Strided:
     """Take every `step`-th node of each chain."""
-    offsets = nodes.placed.offsets
-    within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], np.diff(offsets))
-    taken = within % step == 0
-    chain_points = nodes.chain_points[taken]
-    counts = (np.diff(offsets) - 1) // step
-    starts = np.concatenate([[0], np.cumsum(counts + 1)])
-    pairs = np.stack([chain_points[:-1], chain_points[1:]], axis=1)
-    inside = np.ones(len(pairs), bool)
-    inside[starts[1:-1] - 1] = False
-    chain = np.repeat(np.arange(len(counts)), counts)
-    return Strided(chain_points, starts, pairs[inside], chain, nodes.placed.at[taken])
+    return Strided(*_on_stride(nodes.chain_points, nodes.placed.offsets, nodes.placed.at, step))
+
+
+@kernel
+def _on_stride(chain_points: Ints, offsets: Ints, at: Floats, step: int) -> tuple[Ints, Ints, Ints, Ints, Floats]:
+    n = 0
+    starts = np.zeros(len(offsets), np.int64)
+    for c in range(len(offsets) - 1):
+        starts[c + 1] = starts[c] + (offsets[c + 1] - offsets[c] - 1) // step + 1
+    taken, place = np.empty(starts[-1], np.int64), np.empty(starts[-1])
+    segments = np.empty((starts[-1] - len(offsets) + 1, 2), np.int64)
+    chain = np.empty(len(segments), np.int64)
+    for c in range(len(offsets) - 1):
+        for k in range(starts[c], starts[c + 1]):
+            i = offsets[c] + step * (k - starts[c])
+            taken[k], place[k] = chain_points[i], at[i]
+            if k > starts[c]:
+                segments[n, 0], segments[n, 1], chain[n] = taken[k - 1], taken[k], c
+                n += 1
+    return taken, starts, segments, chain, place
 
 
 def mark_conflicts(

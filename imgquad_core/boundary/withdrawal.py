@@ -16,16 +16,19 @@ from imgquad_core.arrays import Bytes, Flags, Floats, Ints
 from imgquad_core.chains import any_of_chain, places_of
 from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.conflicts import CROSSING, FREE, SHARP, UNITS, find_conflicts, snapped
+from imgquad_core.jit import kernel
 from imgquad_core.model import Chains
-from imgquad_core.threads import LEAST, in_threads
+from imgquad_core.threads import LEAST, even_parts, in_threads
 
 from .areas import mitres, restore_areas
-from .curves import Curves, Ends, arc_lengths, per_point, pin_ends
+from .curves import Curves, Ends, per_point, pin
 from .edge_sizes import grade_along, grade_chains
 from .nodes import (
     Nodes,
+    Placement,
     Strided,
     even_out,
+    joined,
     mark_conflicts,
     mark_sectors,
     number_nodes,
@@ -125,11 +128,13 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
     """
     curves = draft.curves
     at_least = _least_segments(curves.ends)
-    size, withdrawn = size.copy(), np.zeros(len(size))
+    withdrawn, closest = np.zeros(len(size)), np.minimum(_CLOSEST * curves.scale, draft.limit)
     exact, is_new = np.zeros(len(curves.ends), bool), np.ones(len(curves.ends), bool)
+    drawn = _Drawn(np.empty_like(draft.smooth), np.zeros(len(size)), np.zeros(len(size)))
     for attempt in range(patience.most + 2):
         gently = attempt < patience.gentle
-        nodes = _place(draft, size, at_least, exact, withdrawn)
+        _draw(curves, draft.smooth, withdrawn, _withdraw_ends(draft, withdrawn), is_new, drawn)
+        nodes = _place(draft, drawn, size, at_least, exact)
         factor, pull = np.ones(len(size)), np.zeros(len(size))
         strides = on_stride(nodes, 2), on_stride(nodes, 1)
         for strided, marks in zip(strides, draft.marks_of(nodes.points, strides, is_new, gently), strict=True):
@@ -139,10 +144,12 @@ def place_freely(draft: Draft, size: Floats, patience: Patience = PATIENCE) -> t
         failed = any_of_chain(factor < 1.0, curves.offsets)
         if attempt >= patience.curved:
             exact |= failed | (attempt >= patience.most)
-        shorter = np.maximum(size * factor, np.minimum(_CLOSEST * curves.scale, draft.limit))
-        shorter = grade_chains(shorter, curves, len(draft.node), draft.edge_ratio)
+        shorter = np.maximum(size * factor, closest)
+        is_graded = np.zeros(len(failed), bool) if attempt == 0 else ~any_of_chain(shorter != size, curves.offsets)
+        shorter = grade_chains(shorter, curves, len(draft.node), draft.edge_ratio, is_graded)
         failed |= any_of_chain(shorter < size, curves.offsets)
-        size, withdrawn = shorter, np.where(per_point(curves, exact), 1.0, np.minimum(withdrawn + pull, 1.0))
+        size, withdrawn = shorter, np.minimum(withdrawn + pull, 1.0)
+        withdrawn[per_point(curves, exact)] = 1.0
         is_new = _with_neighbours(curves.ends, failed | exact, len(draft.node))
     raise CrossedError(failed)
 
@@ -157,21 +164,46 @@ def _least_segments(ends: Ints) -> Ints:
     return least.astype(np.int64)
 
 
-def _place(draft: Draft, size: Floats, at_least: Ints, exact: Flags, withdrawn: Floats) -> Nodes:
-    curves = draft.curves
-    points = draft.smooth + withdrawn[:, None] * (curves.raw - draft.smooth)
-    pin_ends(points, curves, _withdraw_ends(draft, withdrawn))
-    drawn = curves._replace(arc=_drawn_arc(points, curves))
-    placed = place_nodes(drawn, size, draft.limit, draft.is_corner, at_least, exact, draft.edge_multiple)
-    even_out(points, placed, exact, draft.edge_ratio)
-    return number_nodes(curves, len(draft.node), snapped(points_at(points, placed.at), draft.units), placed)
+class _Drawn(NamedTuple):
+    """Curves between the smoothed ones and the pixel boundary."""
+
+    points: Floats  #: (n, 2)
+    steps: Floats  #: (n,) length from the point before, 0 where a chain begins
+    arc: Floats  #: (n,) sum of these, over all chains
 
 
-def _drawn_arc(points: Floats, curves: Curves) -> Floats:
-    """Length along smoothed chains, one after the other: stairs are up to 8 % longer; no step is longer than theirs."""
-    steps = np.minimum(np.diff(arc_lengths(points, curves.offsets)), np.diff(curves.arc))
-    steps[curves.offsets[1:-1] - 1] = 0.0  # from chain to chain
-    return np.concatenate([[0.0], np.cumsum(steps)])
+@kernel
+def _draw(curves: Curves, smooth: Floats, withdrawn: Floats, node: Floats, is_new: Flags, drawn: _Drawn) -> None:
+    """Draw new chains between their ends, those on the border straight; stairs are up to 8 % longer, no step is."""
+    points, steps, raw = drawn.points, drawn.steps, curves.raw
+    for c in range(len(is_new)):
+        if not is_new[c]:
+            continue
+        first, last = curves.offsets[c], curves.offsets[c + 1] - 1
+        for i in range(first, last + 1):
+            for k in range(2):
+                points[i, k] = smooth[i, k] + withdrawn[i] * (raw[i, k] - smooth[i, k])
+        pin(curves, node, c, points)
+        gone = 0.0
+        for i in range(first + 1, last + 1):
+            before = gone
+            gone += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
+            steps[i] = min(gone - before, curves.arc[i] - curves.arc[i - 1])
+    for i in range(1, len(steps)):
+        drawn.arc[i] = drawn.arc[i - 1] + steps[i]
+
+
+def _place(draft: Draft, drawn: _Drawn, size: Floats, at_least: Ints, exact: Flags) -> Nodes:
+    curves = draft.curves._replace(arc=drawn.arc)
+
+    def place(part: slice) -> tuple[Placement, Floats]:
+        some, is_exact = curves._replace(offsets=curves.offsets[part.start : part.stop + 1]), exact[part]
+        placed = place_nodes(some, size, draft.limit, draft.is_corner, at_least[part], is_exact, draft.edge_multiple)
+        even_out(drawn.points, placed, is_exact, draft.edge_ratio)
+        return placed, snapped(points_at(drawn.points, placed.at), draft.units)
+
+    placed, xy = zip(*in_threads(even_parts(np.diff(curves.offsets), draft.threads), place, draft.threads), strict=True)
+    return number_nodes(curves, len(draft.node), np.concatenate(xy), joined(placed))
 
 
 def _withdraw_ends(draft: Draft, withdrawn: Floats) -> Floats:
