@@ -43,56 +43,62 @@ class Samples(NamedTuple):
     weight: Floats  #: how well each point is known
 
 
-@verb
-def _sum_up(samples: Samples, i: int, w: float, sums: Floats) -> float:
-    """Weighted sums within +-w of point i, with u = arc - arc[i] and x, y relative to it.
+class _Sums(NamedTuple):
+    """Weighted sums over the samples around a point, with u, x and y relative to it."""
 
-    sums[0:5] of u^0..u^4, [5:8] of x, u x, u^2 x, [8:11] of y, u y, u^2 y, [11:14] of x x, x y, y y.
-    Gives the sum of the bell alone, over the samples that count.
-    """
+    count: float  #: of the bell alone, over the samples that count
+    u0: float
+    u1: float
+    u2: float
+    u3: float
+    u4: float
+    x: float
+    ux: float
+    uux: float
+    y: float
+    uy: float
+    uuy: float
+    xx: float
+    xy: float
+    yy: float
+
+
+@verb
+def _sum_up(samples: Samples, i: int, w: float) -> _Sums:
+    """Sum up within +-w of point i, with u = arc - arc[i]."""
     x, y, s, q = samples.x, samples.y, samples.arc, samples.weight
-    for k in range(14):
-        sums[k] = 0.0
-    count = 0.0
+    count = u0 = u1 = u2 = u3 = u4 = 0.0
+    sx = sux = suux = sy = suy = suuy = sxx = sxy = syy = 0.0
     for step in (-1, 1):
         j = i if step == 1 else i - 1
         while 0 <= j < len(s) and abs(s[j] - s[i]) <= w:
-            u, px, py = s[j] - s[i], x[j] - x[i], y[j] - y[i]
-            t = u / w
-            g = 1.0 - _BELL * t * t
-            g *= g
-            count += g * (q[j] > 0.0)
-            g *= q[j]
-            gu, guu = g * u, g * u * u
-            sums[0] += g
-            sums[1] += gu
-            sums[2] += guu
-            sums[3] += guu * u
-            sums[4] += guu * u * u
-            sums[5] += g * px
-            sums[6] += gu * px
-            sums[7] += guu * px
-            sums[8] += g * py
-            sums[9] += gu * py
-            sums[10] += guu * py
-            sums[11] += g * px * px
-            sums[12] += g * px * py
-            sums[13] += g * py * py
+            if q[j] > 0.0:
+                u, px, py = s[j] - s[i], x[j] - x[i], y[j] - y[i]
+                t = u / w
+                g = 1.0 - _BELL * t * t
+                g *= g
+                count += g
+                g *= q[j]
+                gu, guu = g * u, g * u * u
+                u0, u1, u2, u3, u4 = u0 + g, u1 + gu, u2 + guu, u3 + guu * u, u4 + guu * u * u
+                sx, sux, suux = sx + g * px, sux + gu * px, suux + guu * px
+                sy, suy, suuy = sy + g * py, suy + gu * py, suuy + guu * py
+                sxx, sxy, syy = sxx + g * px * px, sxy + g * px * py, syy + g * py * py
             j += step
-    return count
+    return _Sums(count, u0, u1, u2, u3, u4, sx, sux, suux, sy, suy, suuy, sxx, sxy, syy)
 
 
 @verb
-def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
-    """Coefficients of the quadratic with moments m[0:5] and right-hand side b (Cramer); 0 if too few samples tell."""
-    a00 = m[2] * m[4] - m[3] * m[3]
-    a01 = m[2] * m[3] - m[1] * m[4]
-    a02 = m[1] * m[3] - m[2] * m[2]
-    a11 = m[0] * m[4] - m[2] * m[2]
-    a12 = m[1] * m[2] - m[0] * m[3]
-    a22 = m[0] * m[2] - m[1] * m[1]
-    det = m[0] * a00 + m[1] * a01 + m[2] * a02
-    if not det > _SINGULAR * m[0] * m[2] * m[4]:
+def _solve(m: _Sums, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
+    """Coefficients of the quadratic with the moments m and right-hand side b (Cramer); 0 if too few samples tell."""
+    a00 = m.u2 * m.u4 - m.u3 * m.u3
+    a01 = m.u2 * m.u3 - m.u1 * m.u4
+    a02 = m.u1 * m.u3 - m.u2 * m.u2
+    a11 = m.u0 * m.u4 - m.u2 * m.u2
+    a12 = m.u1 * m.u2 - m.u0 * m.u3
+    a22 = m.u0 * m.u2 - m.u1 * m.u1
+    det = m.u0 * a00 + m.u1 * a01 + m.u2 * a02
+    if not det > _SINGULAR * m.u0 * m.u2 * m.u4:
         return 0.0, 0.0, 0.0
     return (
         (a00 * b0 + a01 * b1 + a02 * b2) / det,
@@ -102,16 +108,16 @@ def _solve(m: Floats, b0: float, b1: float, b2: float) -> tuple[float, float, fl
 
 
 @verb
-def quadratic_at(samples: Samples, i: int, w: float, sums: Floats) -> tuple[float, float, float]:
+def quadratic_at(samples: Samples, i: int, w: float) -> tuple[float, float, float]:
     """Fit around point i: its shift in x and in y, and the root mean square residual across the curve."""
-    count = _sum_up(samples, i, w, sums)
-    x0, x1, x2 = _solve(sums, sums[5], sums[6], sums[7])
-    y0, y1, y2 = _solve(sums, sums[8], sums[9], sums[10])
-    xx = sums[11] - x0 * sums[5] - x1 * sums[6] - x2 * sums[7]
-    xy = sums[12] - x0 * sums[8] - x1 * sums[9] - x2 * sums[10]
-    yy = sums[13] - y0 * sums[8] - y1 * sums[9] - y2 * sums[10]
+    m = _sum_up(samples, i, w)
+    x0, x1, x2 = _solve(m, m.x, m.ux, m.uux)
+    y0, y1, y2 = _solve(m, m.y, m.uy, m.uuy)
+    xx = m.xx - x0 * m.x - x1 * m.ux - x2 * m.uux
+    xy = m.xy - x0 * m.y - x1 * m.uy - x2 * m.uuy
+    yy = m.yy - y0 * m.y - y1 * m.uy - y2 * m.uuy
     across = (y1 * y1 * xx - 2 * x1 * y1 * xy + x1 * x1 * yy) / (x1 * x1 + y1 * y1 + 1e-300)
-    return x0, y0, np.sqrt(max(across, 0.0) / count)
+    return x0, y0, np.sqrt(max(across, 0.0) / m.count)
 
 
 @verb
@@ -122,24 +128,27 @@ def _quartic_at(samples: Samples, i: int, w: float, a: Floats) -> tuple[float, f
     what is left of the last row when the others are eliminated is the value at u = 0.
     """
     x, y, s, q = samples.x, samples.y, samples.arc, samples.weight
-    for r in range(5):
-        for c in range(7):
-            a[r, c] = 0.0
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = 0.0  # of powers
+    x0 = x1 = x2 = x3 = x4 = y0 = y1 = y2 = y3 = y4 = 0.0
     for step in (-1, 1):
         j = i if step == 1 else i - 1
         while 0 <= j < len(s) and abs(s[j] - s[i]) <= w:
-            t = (s[j] - s[i]) / w
-            g = 1.0 - _BELL * t * t
-            g *= g * q[j]
-            for r in range(4, -1, -1):
-                a[r, 5] += g * (x[j] - x[i])
-                a[r, 6] += g * (y[j] - y[i])
-                power = g
-                for c in range(4, r - 1, -1):
-                    a[r, c] += power
-                    power *= t
-                g *= t
+            if q[j] > 0.0:
+                t, px, py = (s[j] - s[i]) / w, x[j] - x[i], y[j] - y[i]
+                g = 1.0 - _BELL * t * t
+                g *= g * q[j]
+                s0, x0, y0, g1 = s0 + g, x0 + g * px, y0 + g * py, g * t
+                s1, x1, y1, g2 = s1 + g1, x1 + g1 * px, y1 + g1 * py, g1 * t
+                s2, x2, y2, g3 = s2 + g2, x2 + g2 * px, y2 + g2 * py, g2 * t
+                s3, x3, y3, g4 = s3 + g3, x3 + g3 * px, y3 + g3 * py, g3 * t
+                s4, x4, y4, g5 = s4 + g4, x4 + g4 * px, y4 + g4 * py, g4 * t
+                s5, s6, s7, s8 = s5 + g5, s6 + g5 * t, s7 + g5 * t * t, s8 + g5 * t * t * t
             j += step
+    a[0, 0], a[0, 1], a[0, 2], a[0, 3], a[0, 4], a[0, 5], a[0, 6] = s8, s7, s6, s5, s4, x4, y4
+    a[1, 1], a[1, 2], a[1, 3], a[1, 4], a[1, 5], a[1, 6] = s6, s5, s4, s3, x3, y3
+    a[2, 2], a[2, 3], a[2, 4], a[2, 5], a[2, 6] = s4, s3, s2, x2, y2
+    a[3, 3], a[3, 4], a[3, 5], a[3, 6] = s2, s1, x1, y1
+    a[4, 4], a[4, 5], a[4, 6] = s0, x0, y0
     least = _LEAST_PIVOT * a[4, 4]
     for k in range(4):
         pivot = max(a[k, k], least)  # a power that the samples do not determine gets no share
@@ -156,7 +165,7 @@ def _choose_windows(
     samples: Samples, first: int, scale: Floats, closed: bool, widest: float, windows: Floats, w: Floats
 ) -> None:
     """Half width of the window at the points of a piece, which begins at `first` and has these scales, into w."""
-    s, sums = samples.arc, np.empty(14)
+    s = samples.arc
     last = first + len(scale) - 1
     for k in range(first, last + _EVERY, _EVERY):
         i = min(k, last)
@@ -166,7 +175,7 @@ def _choose_windows(
         for candidate in windows:
             if candidate * unit > widest or (candidate > _DARING and failures > 1):
                 break
-            _, _, rms = quadratic_at(samples, i, candidate * unit, sums)
+            _, _, rms = quadratic_at(samples, i, candidate * unit)
             if rms <= STAIR_NOISE * unit:
                 w[i] = candidate * unit
                 failures = 0
@@ -186,11 +195,11 @@ def _choose_windows(
 
 
 @verb
-def _put_quadratics(samples: Samples, at: int, width: Floats, closed: bool, piece: Floats, sums: Floats) -> None:
+def _put_quadratics(samples: Samples, at: int, width: Floats, closed: bool, piece: Floats) -> None:
     """Move the points of a piece, of which the first stands at `at`, to the values of their quadratics."""
     n = len(piece) - 1
     for j in range(0 if closed else 1, n):
-        dx, dy, _ = quadratic_at(samples, at + j, width[j], sums)
+        dx, dy, _ = quadratic_at(samples, at + j, width[j])
         piece[j, 0], piece[j, 1] = samples.x[at + j] + dx, samples.y[at + j] + dy
     if closed:
         piece[n, 0], piece[n, 1] = piece[0, 0], piece[0, 1]
@@ -299,7 +308,7 @@ def _fit(chains: Samples, scale: Floats, pieces: Ints, closed: Flags, windows: F
     w = np.empty(room)
     width = np.empty(longest + 1)
     true_arc = np.empty(len(x))
-    sums, matrix = np.empty(14), np.empty((5, 7))
+    matrix = np.empty((5, 7))
     for k in range(len(pieces)):
         first, last = pieces[k, 0], pieces[k, 1]
         n = last - first
@@ -314,7 +323,7 @@ def _fit(chains: Samples, scale: Floats, pieces: Ints, closed: Flags, windows: F
             width[j] = w[at + j]
             widest_chosen = max(widest_chosen, width[j] / scale[first + j])
         piece = fitted[first : last + 1]
-        _put_quadratics(samples, at, width, closed[k], piece, sums)
+        _put_quadratics(samples, at, width, closed[k], piece)
         if widest_chosen > _DETAIL:
             true_arc[first] = 0.0
             for j in range(n):

@@ -115,7 +115,7 @@ def _find(curves: Curves, lengths: Floats, begin: int, end: int, is_corner: Flag
     most = _ROUND  # samples on both sides of a point: all those of its chain if need be
     for c in range(begin, end):
         most = max(most, curves.offsets[c + 1] - curves.offsets[c] + 2)
-    beside, sums = Samples(np.empty(most), np.empty(most), np.empty(most), np.full(most, 1.0)), np.empty(14)
+    beside = Samples(np.empty(most), np.empty(most), np.empty(most), np.full(most, 1.0))
     for c in range(begin, end):
         if curves.is_frame[c]:
             continue
@@ -125,7 +125,7 @@ def _find(curves: Curves, lengths: Floats, begin: int, end: int, is_corner: Flag
             if straight <= 0.0:
                 continue
             middle, _ = _gather(curves, c, i, beside)
-            gain = quadratic_at(beside, middle, _SIDE, sums)[2]
+            gain = quadratic_at(beside, middle, _SIDE)[2]
             if gain >= _UNLIKE:
                 j = _nearest(curves, c, i, curves.raw[i, 0] + dx, curves.raw[i, 1] + dy)
                 score[j] = max(score[j], gain + straight)
