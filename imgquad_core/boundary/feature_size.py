@@ -112,15 +112,17 @@ def _bucket(points: Floats, ids: Ints, cell: float, n_across: int, n_up: int) ->
 @verb
 def _arc_between(curves: Curves, c: int, i: int, d: int, j: int) -> float:
     """Length along the curves from point i of chain c to point j of chain d, over at most one node."""
-    to_end_i = curves.arc[curves.offsets[c + 1] - 1] - curves.arc[i]
-    to_end_j = curves.arc[curves.offsets[d + 1] - 1] - curves.arc[j]
     shortest = np.inf
     if c == d:
         shortest = abs(curves.arc[i] - curves.arc[j])
         if curves.ends[c, 0] < 0:
             return float(min(shortest, curves.arc[curves.offsets[c + 1] - 1] - shortest))
+        if curves.ends[c, 0] != curves.ends[c, 1]:
+            return float(shortest)
     elif curves.ends[c, 0] < 0 or curves.ends[d, 0] < 0:
         return shortest
+    to_end_i = curves.arc[curves.offsets[c + 1] - 1] - curves.arc[i]
+    to_end_j = curves.arc[curves.offsets[d + 1] - 1] - curves.arc[j]
     for side in range(2):
         from_i = to_end_i if side else curves.arc[i]
         for other in range(2):
