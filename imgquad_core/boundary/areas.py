@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from imgquad_core.arrays import Floats, Ints
 from imgquad_core.chains import Places, places_of
 from imgquad_core.grouping import linked
+from imgquad_core.jit import kernel, verb
 from imgquad_core.model import BoundaryGraph, Chains
 
 _STEPS = 5  # of Newton towards the wanted areas, at most; most end sooner, at `_GOOD`
@@ -84,39 +85,57 @@ def restore_areas(
     return moved, shift
 
 
+@kernel
 def mitres(points: Floats, places: Places) -> Floats:
     """Shift of each place that shifts the segments before and after it by 1 to their left.
 
     At a corner with an angle of 2 a that is a shift by 1 / sin(a): both its sides keep their directions.
     """
-    unit = _left_normals(points[places.here] - points[places.before])
-    unit_after = _left_normals(points[places.after] - points[places.here])
-    share = 1.0 + (unit * unit_after).sum(axis=1)
-    return np.asarray((unit + unit_after) / np.maximum(share, _SHARPEST)[:, None])
+    found = np.empty((len(places.here), 2))
+    for k in range(len(found)):
+        x, y = _left_normal(points, places.before[k], places.here[k])
+        next_x, next_y = _left_normal(points, places.here[k], places.after[k])
+        share = max(1.0 + (x * next_x + y * next_y), _SHARPEST)
+        found[k, 0], found[k, 1] = (x + next_x) / share, (y + next_y) / share
+    return found
 
 
-def _left_normals(along: Floats) -> Floats:
-    length = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-12)
-    return np.stack([-along[:, 1] / length, along[:, 0] / length], axis=1)
+@verb
+def _left_normal(points: Floats, p: int, q: int) -> tuple[float, float]:
+    dx, dy = points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]
+    length = max(np.hypot(dx, dy), 1e-12)
+    return -dy / length, dx / length
 
 
+@kernel
 def _swept(points: Floats, places: Places, n_chains: int) -> Floats:
     """Area that each chain sweeps about the origin."""
-    p, q = points[places.here], points[places.after]
-    return np.asarray(np.bincount(places.chain, 0.5 * (p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]), n_chains), np.float64)
+    swept = np.zeros(n_chains)
+    for k in range(len(places.here)):
+        p, q = places.here[k], places.after[k]
+        swept[places.chain[k]] += 0.5 * (points[p, 0] * points[q, 1] - points[q, 0] * points[p, 1])
+    return swept
 
 
+@kernel
 def _growth(points: Floats, places: Places, bound: Floats, normal: Floats, shift: Floats) -> Floats:
     """How much the area that each chain sweeps grows by a unit of further shift."""
-    along = points[places.after] - points[places.before]
-    growth = 0.5 * (normal[:, 1] * along[:, 0] - normal[:, 0] * along[:, 1])
-    growth[bound <= np.abs(shift)[places.chain]] = 0.0
-    return np.asarray(np.bincount(places.chain, growth, len(shift)), np.float64)
+    growth = np.zeros(len(shift))
+    for k in range(len(places.here)):
+        p, q, c = places.before[k], places.after[k], places.chain[k]
+        if bound[k] > abs(shift[c]):
+            dx, dy = points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]
+            growth[c] += 0.5 * (normal[k, 1] * dx - normal[k, 0] * dy)
+    return growth
 
 
+@kernel
 def _moved(points: Floats, places: Places, bound: Floats, normal: Floats, shift: Floats) -> Floats:
     moved = points.copy()
-    moved[places.here] += np.clip(shift[places.chain], -bound, bound)[:, None] * normal
+    for k in range(len(places.here)):
+        by = min(max(shift[places.chain[k]], -bound[k]), bound[k])
+        for axis in range(2):
+            moved[places.here[k], axis] += by * normal[k, axis]
     return moved
 
 
