@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.jit import kernel, verb
+from imgquad_core.threads import even_parts, in_threads
 
 from .curves import Curves
 from .feature_size import local_feature_size
@@ -63,7 +64,10 @@ def edge_sizes(
     reach = min(float(limit.max()) / _ACROSS, float(np.hypot(*shape)))
     lfs = local_feature_size(points, curves, reach, _BEND, threads=threads)
     size = np.minimum(limit, _ACROSS * lfs)
-    _limit_turn(points, curves, np.cumsum(is_corner), size)
+    corners: Ints = np.cumsum(is_corner)
+    parts = even_parts(np.diff(curves.offsets), threads)
+    of_parts = [curves._replace(offsets=curves.offsets[part.start : part.stop + 1]) for part in parts]
+    in_threads(of_parts, lambda some: _limit_turn(points, some, corners, size), threads)
     size = np.minimum(np.maximum(size, _FINEST * curves.scale), limit)
     return grade(size, points, curves, growth, edge_ratio, shape)
 
@@ -134,12 +138,28 @@ def _limit_turn(points: Floats, curves: Curves, corners: Ints, size: Floats) -> 
 
 def _grade_plane(size: Floats, points: Floats, slope: float, raster: NDArray[np.float32]) -> Floats:
     """Two chamfer passes over the pixels, then back to the points."""
-    row = np.minimum(points[:, 1].astype(np.int64), raster.shape[0] - 1)
-    column = np.minimum(points[:, 0].astype(np.int64), raster.shape[1] - 1)
-    np.minimum.at(raster, (row, column), size.astype(np.float32))
+    _lower(raster, points, size.astype(np.float32))
     for forward in (True, False):
         _chamfer(raster, np.float32(slope), np.float32(slope * np.sqrt(2.0)), forward)
-    return np.minimum(size, raster[row, column])
+    return _lowered(size, points, raster)
+
+
+@kernel
+def _lower(raster: NDArray[np.float32], points: Floats, size: NDArray[np.float32]) -> None:
+    """Lower pixels to the least size of the points in them."""
+    for i in range(len(points)):
+        r, c = min(int(points[i, 1]), raster.shape[0] - 1), min(int(points[i, 0]), raster.shape[1] - 1)
+        raster[r, c] = min(raster[r, c], size[i])
+
+
+@kernel
+def _lowered(size: Floats, points: Floats, raster: NDArray[np.float32]) -> Floats:
+    """Return the sizes of points, lowered to those of their pixels."""
+    lowered = np.empty(len(size))
+    for i in range(len(points)):
+        r, c = min(int(points[i, 1]), raster.shape[0] - 1), min(int(points[i, 0]), raster.shape[1] - 1)
+        lowered[i] = min(size[i], float(raster[r, c]))
+    return lowered
 
 
 @kernel
