@@ -63,7 +63,24 @@ class Ends(NamedTuple):
 def curves_of(graph: BoundaryGraph, side: Ints | None = None, scale: Floats | None = None) -> tuple[Curves, Ends]:
     """Unpack a pixel boundary; `side` tells what its points are where coordinates do not, see `PixelChains`."""
     side = pixel_chains(graph).side if side is None else side
-    raw = graph.points[graph.chain_points]
+    raw, offsets = graph.points[graph.chain_points], np.array(graph.chain_offsets)
+    first, last = graph.chain_points[offsets[:-1]], graph.chain_points[offsets[1:] - 1]
+    second = graph.chain_points[offsets[:-1] + 1]
+    nodes, ends = ends_of(graph)
+    curves = Curves(
+        raw,
+        arc_lengths(raw, offsets),
+        sample_weights(side, offsets),
+        offsets,
+        nodes,
+        (graph.point_kind[second] == PointKind.FRAME) | _along_border(graph, first, second, last),
+        np.ones(len(raw)) if scale is None else scale,
+    )
+    return curves, ends
+
+
+def ends_of(graph: BoundaryGraph) -> tuple[Ints, Ends]:
+    """Return the nodes at both ends of each chain, -1 closed, and all of them."""
     first, last = graph.chain_points[graph.chain_offsets[:-1]], graph.chain_points[graph.chain_offsets[1:] - 1]
     is_node = (graph.point_kind == PointKind.JUNCTION) | (graph.point_kind == PointKind.CORNER)
     open_ = is_node[first]
@@ -72,22 +89,9 @@ def curves_of(graph: BoundaryGraph, side: Ints | None = None, scale: Floats | No
     ends[open_, 0], ends[open_, 1] = np.searchsorted(nodes, first[open_]), np.searchsorted(nodes, last[open_])
     sockets = np.flatnonzero(ends.ravel() >= 0)
     at = ends.ravel()[sockets]
-    second = graph.chain_points[graph.chain_offsets[:-1] + 1]
-    curves = Curves(
-        raw,
-        arc_lengths(raw, np.array(graph.chain_offsets)),
-        sample_weights(side, np.array(graph.chain_offsets)),
-        np.array(graph.chain_offsets),
-        ends,
-        (graph.point_kind[second] == PointKind.FRAME) | _along_border(graph, first, second, last),
-        np.ones(len(raw)) if scale is None else scale,
-    )
-    return curves, Ends(
-        graph.points[nodes],
-        graph.point_kind[nodes],
-        np.concatenate([[0], np.cumsum(np.bincount(at, minlength=len(nodes)))]).astype(np.int64),
-        sockets[np.argsort(at, kind="stable")],
-    )
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(at, minlength=len(nodes)))]).astype(np.int64)
+    order = np.argsort(at, kind="stable")
+    return ends, Ends(graph.points[nodes], graph.point_kind[nodes], offsets, sockets[order])
 
 
 def _along_border(graph: BoundaryGraph, first: Ints, second: Ints, last: Ints) -> Flags:

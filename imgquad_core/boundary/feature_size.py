@@ -92,21 +92,27 @@ def _every(offsets: Ints, stride: int) -> Ints:
 
 def bucket(points: Floats, ids: Ints, cell: float) -> Buckets:
     """Sort the points `ids` into square cells."""
-    n_across, n_up = (points.max(axis=0) / cell).astype(np.int64) + 1
-    return Buckets(*_bucket(points, ids, cell, int(n_across), int(n_up)), int(n_across), cell)
+    n_across, n_up = int(points[:, 0].max() / cell) + 1, int(points[:, 1].max() / cell) + 1
+    return Buckets(*in_cells(points, ids, cell, n_across, n_up), n_across, cell)
 
 
 @kernel
-def _bucket(points: Floats, ids: Ints, cell: float, n_across: int, n_up: int) -> tuple[Labels, Labels]:
+def in_cells(points: Floats, ids: Ints, cell: float, n_across: int, n_up: int) -> tuple[Labels, Labels]:
+    """Return CSR (start, items) of the points `ids` in each of these cells, row by row; the last ones have no end."""
     start, items = np.zeros(n_across * n_up + 1, np.int32), np.empty(len(ids), np.int32)
     for i in ids:
-        start[int(points[i, 1] / cell) * n_across + int(points[i, 0] / cell)] += 1
+        start[_cell_of(points, i, cell, n_across, n_up)] += 1
     add_up(start)
     for k in range(len(ids) - 1, -1, -1):
-        at = int(points[ids[k], 1] / cell) * n_across + int(points[ids[k], 0] / cell)
+        at = _cell_of(points, ids[k], cell, n_across, n_up)
         start[at] -= 1
         items[start[at]] = ids[k]
     return start, items
+
+
+@verb
+def _cell_of(points: Floats, i: int, cell: float, n_across: int, n_up: int) -> int:
+    return min(int(points[i, 1] / cell), n_up - 1) * n_across + min(int(points[i, 0] / cell), n_across - 1)
 
 
 @verb

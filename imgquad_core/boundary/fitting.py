@@ -46,7 +46,7 @@ class Samples(NamedTuple):
 class _Sums(NamedTuple):
     """Weighted sums over the samples around a point, with u, x and y relative to it."""
 
-    count: float  #: of the bell alone, over the samples that count
+    bell: float  #: of the bell alone, over the samples that count
     u0: float
     u1: float
     u2: float
@@ -117,7 +117,7 @@ def quadratic_at(samples: Samples, i: int, w: float) -> tuple[float, float, floa
     xy = m.xy - x0 * m.y - x1 * m.uy - x2 * m.uuy
     yy = m.yy - y0 * m.y - y1 * m.uy - y2 * m.uuy
     across = (y1 * y1 * xx - 2 * x1 * y1 * xy + x1 * x1 * yy) / (x1 * x1 + y1 * y1 + 1e-300)
-    return x0, y0, np.sqrt(max(across, 0.0) / m.count)
+    return x0, y0, np.sqrt(max(across, 0.0) / m.bell)
 
 
 @verb

@@ -25,7 +25,8 @@ from imgquad_core.grouping import rows_of
 from imgquad_core.jit import kernel, verb
 from imgquad_core.model import VOID, PointKind
 
-from .curves import ELSEWHERE, PIXEL_CORNER, PixelChains, curves_of, numbered, rings
+from .curves import ELSEWHERE, PIXEL_CORNER, PixelChains, curves_of, ends_of, numbered, rings
+from .feature_size import in_cells
 from .stars import ALONG, MOST, REACHES, Grid, Net, best_place, best_reach, star_of
 
 _CHORD = 6  # dense points from chord to chord of a chain's length: arcs of stairs are up to 41 % too long
@@ -126,10 +127,7 @@ def _ranks(place: Floats, kind: Bytes, shape: tuple[float, float]) -> Ints:
 
 def _grid_of(points: Floats, shape: tuple[float, float], cell: float) -> Grid:
     n_across, n_up = int(shape[1] / cell) + 1, int(shape[0] / cell) + 1
-    column, row = np.minimum((points / cell).astype(np.int64), [n_across - 1, n_up - 1]).T
-    at = row * n_across + column
-    start = np.concatenate([[0], np.cumsum(np.bincount(at, minlength=n_across * n_up))])
-    return Grid(start, np.argsort(at, kind="stable"), n_across, n_up, cell)
+    return Grid(*in_cells(points, np.arange(len(points)), cell, n_across, n_up), n_across, n_up, cell)
 
 
 @kernel
@@ -215,9 +213,16 @@ def _join(net: Net, c: int, star: Ints, n: int, x: float, y: float, reach: float
 def _drawn(chains: PixelChains, net: Net, units: Floats | float) -> tuple[PixelChains, Ints]:
     """Draw what is left as dense points, with spokes; also return the old number of each chain."""
     which = np.flatnonzero(~net.gone)
-    drawn = [_drawn_chain(chains, net, c, units) for c in which.tolist()]
-    offsets = np.concatenate([[0], np.cumsum([len(side) for _, side in drawn])])
-    raw, side = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
+    has_spoke = _have_spokes(net, which)
+    drawn = [_drawn_chain(chains, net, c, units) for c in which[has_spoke].tolist()]
+    counts = np.diff(net.offsets)[which]
+    counts[has_spoke] = [len(side) for _, side in drawn]
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    source = np.arange(offsets[-1]) + np.repeat(net.offsets[which] - offsets[:-1], counts)
+    source[np.repeat(has_spoke, counts)] = 0
+    raw, side = net.raw[source], chains.side[source]
+    for k, new in zip(np.flatnonzero(has_spoke).tolist(), drawn, strict=True):
+        raw[offsets[k] : offsets[k + 1]], side[offsets[k] : offsets[k + 1]] = new
     used, node = np.unique(net.node[which], return_inverse=True)
     used, node = used[used >= 0], node.reshape(-1, 2) - np.count_nonzero(used < 0)
     ids = numbered(offsets, node, len(used))
@@ -237,11 +242,13 @@ def _drawn(chains: PixelChains, net: Net, units: Floats | float) -> tuple[PixelC
     return PixelChains(graph, side), which
 
 
+def _have_spokes(net: Net, which: Ints) -> Flags:
+    """Tell which chains have a spoke at one of their ends."""
+    return np.asarray(((net.node[which] >= 0) & (net.reach[net.node[which]] > 0.0)).any(axis=1))
+
+
 def _drawn_chain(chains: PixelChains, net: Net, c: int, units: Floats | float) -> tuple[Floats, Ints]:
-    """Return the dense points of a chain, and what they are; the new ones are on the grid."""
-    first, last = net.offsets[c], net.offsets[c + 1]
-    if net.node[c, 0] < 0 or (net.reach[net.node[c]] == 0.0).all():
-        return net.raw[first:last], chains.side[first:last]
+    """Return the dense points of a chain with spokes, and what they are; the new ones are on the grid."""
     places = net.place[net.node[c]]
     start, stop = places
     begin, end = net.kept[c, 0], net.kept[c, 1] + 1
@@ -271,7 +278,7 @@ def _nodes_in_conflict(chains: PixelChains, net: Net, which: Ints, units: Floats
     ends = net.node[which]
     has_spoke = (ends >= 0) & (net.reach[ends] > 0.0)
     chain = rows_of(graph.chain_offsets, gaps=True)
-    marks = find_conflicts(graph.points, graph.segments, chain, has_spoke.any(axis=1), graph.shape, units)
+    marks = find_conflicts(graph.points, graph.segments, chain, _have_spokes(net, which), graph.shape, units)
     is_hit = np.zeros(len(which), bool)
     is_hit[chain[marks >= CROSSING]] = True
     is_hit |= _changed_order(chains, net, which)
@@ -288,8 +295,8 @@ def _nodes_in_conflict(chains: PixelChains, net: Net, which: Ints, units: Floats
 
 def _changed_order(chains: PixelChains, net: Net, which: Ints) -> Flags:
     """Tell which chains leave a node in another order than they did."""
-    curves, ends = curves_of(*chains)
-    ring, _ = rings(curves.raw, curves.offsets, ends.offsets, ends.sockets)
+    graph, (_, ends) = chains.graph, ends_of(chains.graph)
+    ring, _ = rings(graph.points[graph.chain_points], graph.chain_offsets, ends.offsets, ends.sockets)
     new = np.full(len(net.gone), -1, np.int64)
     new[which] = np.arange(len(which))
     old = (2 * which[:, None] + [0, 1]).ravel()

@@ -315,14 +315,22 @@ def mark_conflicts(
     Only pairs with a segment on a chain of `is_new` are tested for the former.
     """
     marks = find_conflicts(points, strided.segments, strided.chain, is_new, shape, units)
-    beyond = np.abs(2.0 * points - shape[::-1]) > np.array(shape[::-1]) + 4.0 / units  # rounded to steps of the grid
-    if beyond.any():
-        marks[beyond.any(axis=1)[strided.segments].any(axis=1)] = CROSSING  # past void nothing else is crossed
+    _mark_beyond(points, strided.segments, float(shape[1]), float(shape[0]), 4.0 / units, marks)
     if gently:
         mark_sectors(points, strided, ends, marks)
     else:
         marks[marks < CROSSING] = 0
     return marks
+
+
+@kernel
+def _mark_beyond(points: Floats, segments: Ints, width: float, height: float, off: float, marks: Bytes) -> None:
+    """Mark segments that leave the picture, but for rounding: past void nothing else is crossed."""
+    for k in range(len(segments)):
+        for end in range(2):
+            x, y = points[segments[k, end], 0], points[segments[k, end], 1]
+            if abs(2.0 * x - width) > width + off or abs(2.0 * y - height) > height + off:
+                marks[k] = CROSSING
 
 
 def mark_sectors(points: Floats, strided: Strided, ends: Ends, marks: Bytes) -> None:

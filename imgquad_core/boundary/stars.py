@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.arrays import Flags, Floats, Ints, Labels
 from imgquad_core.jit import verb
 
 ALONG = np.array([0.5, 0.35, 0.65, 0.2, 0.8, 0.0, 1.0])  # of the chain: places of the new node that are looked at
@@ -51,8 +51,8 @@ class Net(NamedTuple):
 class Grid(NamedTuple):
     """Dense points in square cells."""
 
-    start: Ints
-    items: Ints
+    start: Labels
+    items: Labels
     n_across: int
     n_up: int
     cell: float
