@@ -5,6 +5,8 @@ const SLOW = 25; // ms of a drawing from which moves show the last one shifted
 const REST = 140; // ms after the last move when it is drawn anew
 const WIDE = 4096; // texels in a row of a table
 export const LARGEST = 4096; // side of a picture that is shown, as in packing.py
+const HOLE = 0.25; // square pixels of the picture that are none: what is rounded in the areas of a million quads is less
+const NEAR = 0.01; // pixels of the picture from its border that are on it
 const VOID = [0, 0, 0, 0];
 
 // Lines and quads are four vertices each, drawn block by block; lines are a table of four numbers in a texture, fetched by
@@ -153,7 +155,8 @@ export class View {
   setQuads({ corners, jacobians, places }) {
     this._drop(this.quads);
     const gl = this.gl, buffers = [this._buffer(gl.ARRAY_BUFFER, corners), gl.createBuffer()];
-    this.quads = { corners, jacobians, places, buffers, n: jacobians.length, boxes: boxesOf(corners) };
+    const boxes = boxesOf(corners);
+    this.quads = { corners, jacobians, places, buffers, n: jacobians.length, boxes, filled: filledBox(corners, boxes) };
   }
 
   // Gives the corners of all quads their colours, if these are others than before: grey outside `range`.
@@ -271,7 +274,7 @@ export class View {
     gl.viewport(0, 0, width, height);
     gl.clearColor(...rgb(getComputedStyle(this.canvas.parentElement).backgroundColor).map((c) => c / 255), 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    if (this.shown.picture) this._drawPicture();
+    if (this.shown.picture && !this._isHidden()) this._drawPicture();
     if (this.shown.quads && this.quads) this._drawQuads();
     if (this.shown.lines && this.lines) this._drawLines(this.lines, 1.5 * this.ratio, [0.85, 0.1, 0.35, 1]);
     if (this.shown.quads && this.mark) for (const [width, ink] of [[4, [1, 1, 1, 1]], [2, [0.8, 0, 0.5, 1]]]) this._drawLines(this.mark, width * this.ratio, ink);
@@ -287,6 +290,14 @@ export class View {
     gl.useProgram(made.program);
     gl.uniform4f(places.camera, x, y, (2 * scale) / this.canvas.width, (2 * scale) / this.canvas.height);
     return places;
+  }
+
+  // Whether quads lie over all of the picture that is in view: without a graphics card it costs more than they do.
+  _isHidden() {
+    if (!this.shown.quads || !this.quads?.filled) return false;
+    const [left, top, right, bottom] = this.quads.filled, [width, height] = this.size;
+    const [x0, y0] = this.toPicture(0, 0), [x1, y1] = this.toPicture(this.canvas.clientWidth, this.canvas.clientHeight);
+    return left <= Math.max(x0, 0) + NEAR && top <= Math.max(y0, 0) + NEAR && right >= Math.min(x1, width) - NEAR && bottom >= Math.min(y1, height) - NEAR;
   }
 
   _drawPicture() {
@@ -421,6 +432,17 @@ function boxesOf(corners) {
     boxes.push(box);
   }
   return boxes;
+}
+
+// The box around all quads, if they leave no hole in it.
+function filledBox(corners, boxes) {
+  const [left, top, right, bottom] = [0, 1, 2, 3].map((k) => Math[k < 2 ? "min" : "max"](...boxes.map((box) => box[k])));
+  let area = 0;
+  for (let at = 0; at < corners.length; at += 8) {
+    const across = (corners[at + 4] - corners[at]) * (corners[at + 7] - corners[at + 3]);
+    area += 0.5 * Math.abs(across - (corners[at + 5] - corners[at + 1]) * (corners[at + 6] - corners[at + 2]));
+  }
+  return area > (right - left) * (bottom - top) - HOLE ? [left, top, right, bottom] : null;
 }
 
 function holds(corners, at, x, y) {
