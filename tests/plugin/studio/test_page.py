@@ -229,6 +229,27 @@ def test_mesh_histogram_and_worst_quad(page: Any, rock: Path) -> None:
     assert "scaled Jacobian" in page.inner_text("#hover")
 
 
+def test_a_picture_is_left_out_where_the_mesh_hides_all_of_it(page: Any, rock: Path) -> None:
+    give(page, rock)
+    go(page, 3)
+    found = page.evaluate(
+        """() => {
+            const { view, results } = studio, { corners, jacobians, places } = results.mesh.arrays;
+            const draw = view._drawPicture.bind(view), seen = () => (view.draw(), view.canvas.toDataURL());
+            let drawn = 0;
+            view._drawPicture = () => (drawn++, draw());
+            const hidden = seen(), without = drawn;
+            view.quads.filled = null;
+            const same = seen() === hidden, beneath = drawn;
+            const rest = { corners: corners.subarray(8), jacobians: jacobians.subarray(1), places: places.subarray(1) };
+            view.setQuads(rest);
+            seen();
+            return [without, same, beneath, drawn];
+        }"""
+    )
+    assert found == [0, True, 1, 2]  # one quad less is a hole
+
+
 def test_moves_draw_frames(page: Any, rock: Path) -> None:
     give(page, rock)
     box = page.locator("#canvas").bounding_box()
