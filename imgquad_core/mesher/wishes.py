@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from imgquad_core.chains import chain_of_places, edges_of_chains, near_segments,
 from imgquad_core.cleanup.areas import Area
 from imgquad_core.geometry.quad_shape import lower_to_worst
 from imgquad_core.grouping import linked
-from imgquad_core.measures.quality import quad_areas, scaled_jacobian
+from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.model import BoundaryGraph, PointKind, QuadMesh
 
 from .options import MeshingOptions
@@ -84,8 +85,8 @@ def _spots(mesh: QuadMesh, graph: BoundaryGraph, reach: int, limit: float) -> It
     group = _groups(np.append(np.tile(run, 2), n_runs + quad), np.append(ends, node), n_runs + len(poor))
     least = np.ones(len(group))
     np.minimum.at(least, group[n_runs:], worst)
-    edge = float(np.sqrt(np.mean(quad_areas(mesh.points, mesh.quads))))
-    cells = _Cells.of(mesh, graph.shape, REACH * WIDTH * edge)
+    edge = np.sqrt(graph.shape[0] * graph.shape[1] / mesh.n_quads)
+    cells = _Cells.of(mesh, graph.shape, REACH * WIDTH * float(edge), np.append(ends, node))
     at, of = (_rows(each, len(group)) for each in (group[run], group[n_runs:]))
     for g in np.argsort(least, kind="stable"):
         if least[g] == 1.0:  # there is no such group, or no poor quad in it
@@ -155,7 +156,7 @@ def _may_be_halved(graph: BoundaryGraph) -> Flags:
 
 
 class _Cells(NamedTuple):
-    """Which quads begin in each square of a grid."""
+    """Which quads begin in each square of a grid near some places."""
 
     side: float  #: px
     across: int  #: number of squares in a row
@@ -163,13 +164,20 @@ class _Cells(NamedTuple):
     quads: Ints
 
     @staticmethod
-    def of(mesh: QuadMesh, shape: tuple[int, int], side: float) -> _Cells:
-        """Sort the quads of a mesh."""
-        column, row = (mesh.points[mesh.quads[:, 0]] // side).astype(np.int64).T
+    def of(mesh: QuadMesh, shape: tuple[int, int], side: float, nodes: Ints) -> _Cells:
+        """Sort the quads of a mesh that are near some nodes."""
         down, across = (int(n // side) + 1 for n in shape)
+        column, row = (mesh.points // side).astype(np.int64).T
         cell = row * across + column
-        counts = np.bincount(cell, minlength=down * across)
-        return _Cells(side, across, np.append(0, np.cumsum(counts)), np.argsort(cell, kind="stable"))
+        is_near = np.zeros((down + 2, across + 2), bool)
+        for up, right in product((0, 1, 2), repeat=2):
+            is_near[row[nodes] + up, column[nodes] + right] = True
+        near = is_near[1:-1, 1:-1].ravel()
+        first = cell[mesh.quads[:, 0]]
+        quads = np.flatnonzero(near[first])
+        counts = np.bincount(first[quads], minlength=down * across)
+        order = np.argsort(first[quads], kind="stable")
+        return _Cells(side, across, np.append(0, np.cumsum(counts)), quads[order])
 
     def near(self, points: Floats) -> Ints:
         """Return the quads in squares that points are in, and in those around and between."""
