@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Flags, Floats, Ints
+from imgquad_core.arrays import Flags, Ints
 from imgquad_core.geometry.quad_shape import quad_area, quad_quality
 from imgquad_core.jit import kernel, verb
 
@@ -151,15 +151,6 @@ def _cost_then(net: Net, cavity: Cavity, inner: int) -> int:
     return cost
 
 
-@verb
-def _mean_edge(points: Floats, cavity: Cavity) -> float:
-    total, n = 0.0, cavity.tally[OUTLINE]
-    for i in range(n):
-        u, w = cavity.loop[i], cavity.loop[(i + 1) % n]
-        total += np.hypot(points[u, 0] - points[w, 0], points[u, 1] - points[w, 1])
-    return float(total / n)
-
-
 @kernel
 def _is_better(net: Net, cavity: Cavity, canvas: Canvas, gain: int, tolerance: float, worst: float) -> bool:
     """Whether the drawn pattern may replace the cavity."""
@@ -211,8 +202,7 @@ def _choose(net: Net, cavity: Cavity, cut: Ints, last_gain: int, last_size: int)
     gain = cavity.tally[COST] - _cost_then(net, cavity, inner)
     if gain <= 0 or (gain <= last_gain and cavity.tally[MEMBERS] < RETRY * last_size):
         return 0
-    edge = _mean_edge(net.points, cavity)
-    if whole or choose_cut(net.points, cavity.loop, cavity.corner, cavity.length, n, edge, cut):
+    if whole or choose_cut(net.points, cavity.loop, cavity.corner, cavity.length, n, cut):
         return int(gain)
     return 0
 

@@ -86,35 +86,57 @@ def _cut_sides(length: Ints, n: int, i: int, j: int, a: int, b: int, l: int, one
 
 
 @verb
-def choose_cut(points: Floats, loop: Ints, corner: Ints, length: Ints, n: int, edge: float, best: Ints) -> bool:
+def _edges_of_cut(n: int, one: int, before: int, after: int, two: int) -> tuple[int, int]:
+    """Fewest and most edges of a cut so that one pattern fills a piece: each spoke of an n-gon, n 3 or 5, has an edge.
+
+    The sides of the piece are one, before, after, two and the cut; a triangle has but one and two beside it.
+    """
+    if n == 3:
+        return abs(one - two) + 2, one + two - 2
+    least = max(abs(one + before - after - two), before + after - one - two)
+    return least + 2, before + after - abs(one - two) - 2
+
+
+@verb
+def _mean_edge(points: Floats, loop: Ints, n: int) -> float:
+    total = 0.0
+    for i in range(n):
+        u, w = loop[i], loop[(i + 1) % n]
+        total += np.hypot(points[u, 0] - points[w, 0], points[u, 1] - points[w, 1])
+    return float(total / n)
+
+
+@verb
+def choose_cut(points: Floats, loop: Ints, corner: Ints, length: Ints, n: int, best: Ints) -> bool:
     """Find the cut whose number of edges suits its length best; `best` gets (i, j, a, b, l).
 
-    `loop` holds the outline, `corner` the places of the corners in it, `edge` the mean edge length.
+    `loop` holds the outline, `corner` the places of the corners in it. Numbers of edges tell most cuts apart: what is
+    left is measured.
     """
-    one, two = np.empty(MAX_CORNERS + 2, np.int64), np.empty(MAX_CORNERS + 2, np.int64)
     apart = 3 if n == 6 else 1  # sides between the cut's ends: 6 = 5 + 5, 4 = 3 + 5, 2 = 3 + 3
-    score = np.inf
-    n_loop = 0
+    score, edge, n_loop = np.inf, 0.0, 0
     for i in range(n):
         n_loop += length[i]
+    if n_loop % 2 == 1:  # as no outline of quads is
+        return False
     for i in range(n if n == 4 else n // 2):
         j = i + apart
-        for a in range(1, length[i]):
-            u = loop[(corner[i] + a) % n_loop]
-            for b in range(1, length[j % n]):
-                w = loop[(corner[j % n] + b) % n_loop]
+        side, other = length[i], length[j % n]
+        for a in range(1, side):
+            for b in range(1, other):
+                least, most = _edges_of_cut(apart + 2, side - a, length[(i + 1) % n], length[(i + 2) % n], b)
+                low, high = _edges_of_cut(n - apart + 2, other - b, length[(j + 1) % n], length[(j + 2) % n], a)
+                least, most = max(least, low), min(most, high)
+                if least > most:
+                    continue
+                if edge == 0.0:
+                    edge = _mean_edge(points, loop, n_loop)
+                u, w = loop[(corner[i] + a) % n_loop], loop[(corner[j % n] + b) % n_loop]
                 ideal = np.hypot(points[u, 0] - points[w, 0], points[u, 1] - points[w, 1]) / edge
                 l = max(1, int(np.floor(ideal + 0.5)))
-                around = b + length[i] - a
-                for k in range(i + 1, j):
-                    around += length[k]
-                if (l + around) % 2 == 1:  # the outline of each piece must be even
+                if (l - least) % 2 == 1:  # the outline of each piece must be even, as it is with the fewest edges
                     l = l + 1 if l < ideal or l == 1 else l - 1
-                p = length[i] - a
-                if abs(l - ideal) >= score or (apart == 1 and not abs(p - b) < l < p + b):  # no triangle
-                    continue
-                _cut_sides(length, n, i, j, a, b, l, one, two)
-                if piece_fits(one, apart + 2) and piece_fits(two, n - apart + 2):
+                if least <= l <= most and abs(l - ideal) < score:
                     score = abs(l - ideal)
                     best[0], best[1], best[2], best[3], best[4] = i, j, a, b, l
     return score < np.inf

@@ -17,8 +17,8 @@ ROOM = 2000
 
 
 @kernel
-def choose_cut(points: Points, loop: Ids, corner: Ids, length: Ids, n: int, edge: float, best: Ids) -> bool:
-    return patterns.choose_cut(points, loop, corner, length, n, edge, best)
+def choose_cut(points: Points, loop: Ids, corner: Ids, length: Ids, n: int, best: Ids) -> bool:
+    return patterns.choose_cut(points, loop, corner, length, n, best)
 
 
 @kernel
@@ -145,8 +145,7 @@ def cut_on(length: Ids) -> tuple[Canvas, Points, Ids, Ids] | None:
     """Draw the best cut; None where there is none."""
     outline, corner = polygon(length)
     canvas, loop, cut = canvas_on(outline), np.arange(len(outline)), np.zeros(5, np.int64)
-    edge = float(np.hypot(*(outline - np.roll(outline, -1, axis=0)).T).mean())
-    if not choose_cut(outline, loop, corner, length, len(length), edge, cut):
+    if not choose_cut(outline, loop, corner, length, len(length), cut):
         return None
     draw_cut(canvas, loop, corner, length, len(length), cut)
     return canvas, outline, corner, cut
@@ -176,14 +175,42 @@ def test_every_cut(n: int, least: int, most: int, irregular: list[int], fewest: 
     assert found >= fewest
 
 
-def test_cut_is_as_long_as_its_edges_should_be() -> None:
-    length = np.array([6, 6, 4, 4])
-    outline, corner = polygon(length)
-    cut = np.zeros(5, np.int64)
-    assert choose_cut(outline, np.arange(20), corner, length, 4, 3.0, cut)
-    i, j, a, b, edges = cut.tolist()
-    ends = outline[[(corner[i] + a) % 20, (corner[j % 4] + b) % 20]]
-    assert abs(edges - np.hypot(*(ends[0] - ends[1])) / 3.0) < 1
+def edges_on_length(outline: Points, corner: Ids, cut: Ids) -> float:
+    """How many of the outline's mean edges a straight cut is long."""
+    n, n_loop, (i, j, a, b) = len(corner), len(outline), cut[:4]
+    ends = outline[[(corner[i] + a) % n_loop, (corner[j % n] + b) % n_loop]]
+    return float(np.hypot(*(ends[0] - ends[1])) / np.hypot(*(outline - np.roll(outline, -1, axis=0)).T).mean())
+
+
+def all_cuts(length: Ids) -> list[Ids]:
+    """Every cut that leaves two pieces with patterns, whatever its length."""
+    n, apart = len(length), {2: 1, 4: 1, 6: 3}[len(length)]
+    found = []
+    for i in range(n if n == 4 else n // 2):
+        j = i + apart
+        sides = np.roll(length, -i)
+        for a, b, edges in product(range(1, sides[0]), range(1, sides[apart]), range(1, 20)):
+            one = np.array([sides[0] - a, *sides[1:apart], b, edges])
+            two = np.array([sides[apart] - b, *sides[apart + 1 :], a, edges])
+            if piece_fits(one, len(one)) and piece_fits(two, len(two)):
+                found.append(np.array([i, j, a, b, edges]))
+    return found
+
+
+@pytest.mark.parametrize("n", [2, 4, 6])
+def test_no_cut_suits_its_length_better(n: int) -> None:
+    random, found = np.random.default_rng(n), 0
+    for _ in range(200):
+        length, cut = random.integers(3, 8, n), np.zeros(5, np.int64)
+        outline, corner = polygon(length)
+        outline = outline + random.uniform(-1, 1, outline.shape)
+        off = [abs(edges_on_length(outline, corner, way) - way[4]) for way in all_cuts(length)]
+        if choose_cut(outline, np.arange(len(outline)), corner, length, n, cut):
+            assert abs(edges_on_length(outline, corner, cut) - cut[4]) == pytest.approx(min(off))
+            found += 1
+        else:
+            assert min(off, default=9.0) > 1.0
+    assert found >= 10
 
 
 def test_line_is_straight_and_evenly_spaced() -> None:
