@@ -104,6 +104,16 @@ class _Loaded(JITCodeLibrary):  # type: ignore[misc]
         return self._linkable
 
 
+class _Whole(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a kernel. Its copies of what it calls are its own: they take only the arguments that they look at."""
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if function.linkage == binding.Linkage.linkonce_odr and not function.name.startswith("NRT_"):
+                function.linkage = "internal"
+        super()._optimize_final_module()
+
+
 class _Part(JITCodeLibrary):  # type: ignore[misc]
     """Code that becomes part of kernels: optimised with them, never run by itself."""
 
@@ -126,6 +136,9 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
         """Compile what `state` has."""
         if not _makes_arrays(state):
             state.targetctx = state.targetctx.subtarget(enable_nrt=False, cached_internal_func=_UNCOUNTED)
+        if state.library is None:
+            state.library = _Whole(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.enable_object_caching()
         return bool(super().run_pass(state))
 
 
