@@ -277,8 +277,8 @@ def push_side(net: Net, cavity: Cavity) -> bool:
             if t < 0:
                 blocked = True
                 break
-            for k in range(4):
-                v = net.quads[t >> 2, k]
+            for k in range(2, 4):  # the nodes across: those of the edge are in the cavity
+                v = net.quads[t >> 2, (t + k) & 3]
                 if cavity.seen[v] != stamp and net.valence[v] != net.wanted[v]:
                     score += 1000
         score += cavity.length[s]
