@@ -25,7 +25,7 @@ class Effort(NamedTuple):
 
 EFFORTS: Mapping[str, Effort] = {
     "fast": Effort(CleanUp((16, 40), 0.2, 0.6), CleanUp((16,), 0.2, 0.6), 0.4, 0),
-    "normal": Effort(CleanUp((40, 160), 0.7, 0.6), CleanUp((16, 40, 80), 0.7, 0.6), 0.55, 2),
+    "normal": Effort(CleanUp((40, 160), 0.7, 0.6, 160), CleanUp((16, 40, 80), 0.7, 0.6), 0.55, 2),
     "best": Effort(
         CleanUp((16, 40, 80, 160, 160), 0.8, 0.6, 160), CleanUp((16, 40, 80, 160), 1.0, 0.6, 160), 0.55, 4, True
     ),
