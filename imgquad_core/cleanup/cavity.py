@@ -271,12 +271,13 @@ def push_side(net: Net, cavity: Cavity) -> bool:
     n, n_loop, stamp = cavity.tally[CORNERS], cavity.tally[OUTLINE], cavity.tally[STAMP]
     best, best_score = -1, -1
     for s in range(n):
-        score, blocked = 0, False
-        for i in range(cavity.length[s]):
-            t = net.twins[cavity.edge[(cavity.corner[s] + i) % n_loop]]
+        score, blocked, place = 0, False, cavity.corner[s]
+        for _ in range(cavity.length[s]):
+            t = net.twins[cavity.edge[place]]
             if t < 0:
                 blocked = True
                 break
+            place = place + 1 if place + 1 < n_loop else 0  # a remainder takes as long as all of the rest
             for k in range(2, 4):  # the nodes across: those of the edge are in the cavity
                 v = net.quads[t >> 2, (t + k) & 3]
                 if cavity.seen[v] != stamp and net.valence[v] != net.wanted[v]:

@@ -121,11 +121,12 @@ def choose_cut(points: Floats, loop: Ints, corner: Ints, length: Ints, n: int, b
         return False
     for i in range(n if n == 4 else n // 2):
         j = i + apart
-        side, other = length[i], length[j % n]
-        for a in range(1, side):
-            for b in range(1, other):
-                least, most = _edges_of_cut(apart + 2, side - a, length[(i + 1) % n], length[(i + 2) % n], b)
-                low, high = _edges_of_cut(n - apart + 2, other - b, length[(j + 1) % n], length[(j + 2) % n], a)
+        p, p_before, p_after = length[i], length[(i + 1) % n], length[(i + 2) % n]
+        q, q_before, q_after = length[j % n], length[(j + 1) % n], length[(j + 2) % n]
+        for a in range(1, p):
+            for b in range(1, q):
+                least, most = _edges_of_cut(apart + 2, p - a, p_before, p_after, b)
+                low, high = _edges_of_cut(n - apart + 2, q - b, q_before, q_after, a)
                 least, most = max(least, low), min(most, high)
                 if least > most:
                     continue
