@@ -2,6 +2,8 @@
 
 - A verb is called by kernels only, which hold a copy of it. It gets no machine code of its own, and is not optimised
   before it is part of a kernel.
+- What a kernel calls is its own, so that only the arguments that it looks at are handed over: a NamedTuple of arrays
+  is some hundred numbers otherwise (a clean-up takes a quarter less time).
 - References to arrays are counted only where arrays are made: elsewhere the caller holds all of them.
 - Machine code from disk is loaded without what compiling would need (0.34 -> 0.11 s for the 56 kernels of a run).
 - Which of its 50 kinds of sums an ``a + b`` is, is looked up once for each pair of types.
