@@ -17,8 +17,8 @@ from imgquad_core.jit import share_on_disk
 from .graph import ClusterError, Step, Told, run_here, run_on
 
 REACHED = 20  #: seconds in which a scheduler must answer
-#: bytes that glibc keeps, and from which it asks for pages of their own. With the 64 kB that Dask sets, workers give all
-#: arrays back at once: pages that come again took a sixth of the CPU seconds
+#: bytes that glibc keeps, and from which a block gets pages of its own. With the 64 kB that Dask sets, workers give all
+#: arrays back at once, and pages that come again took a sixth of the CPU seconds
 MALLOC = {"MALLOC_TRIM_THRESHOLD_": 256 << 20, "MALLOC_MMAP_THRESHOLD_": 32 << 20}
 
 
