@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imgquad_core.arrays import Bytes, Flags, Floats, Ints, Labels
+from imgquad_core.arrays import Flags, Floats, Ints, Labels
 from imgquad_core.chains import with_mid_points
 from imgquad_core.cleanup.areas import Area, cleaned, nameless, rim_of
 from imgquad_core.cleanup.options import CleanUp
@@ -155,7 +155,7 @@ def _cut_out(area: Area, gone: Ints, ends: Ints, labels: Labels) -> _Cut:
     middle = order[np.searchsorted(names[order], name[split])]
     graph, rim, moved = _side_by_side(traced, labels[part])
     finer = with_mid_points(graph, split)
-    kind = _held(traced.point_kind[rim], len(finer.points))
+    kind = np.full(len(finer.points), PointKind.HELD, np.uint8)  # corners, too: an edge between two may be halved
     ids = np.append(used[rim], len(area.points) + middle)
     return _Cut(replace(finer, point_kind=kind), ids, part, moved)
 
@@ -199,11 +199,3 @@ def _side_by_side(traced: QuadMesh, label: Labels) -> tuple[BoundaryGraph, Ints,
         traced.chain_regions, label, np.maximum(areas, 1.0).astype(np.int64), shape,
     )  # fmt: skip
     return graph, rim, moved
-
-
-def _held(old: Bytes, n: int) -> Bytes:
-    """Return the kinds of n points that all stay: those of a mesh's boundary, and mid-points after them."""
-    kind = np.full(n, PointKind.HELD, np.uint8)
-    stays = np.flatnonzero(np.isin(old, (PointKind.JUNCTION, PointKind.CORNER)))
-    kind[stays] = old[stays]
-    return kind

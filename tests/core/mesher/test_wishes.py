@@ -100,6 +100,24 @@ def test_what_does_not_help_leaves_the_mesh_as_it_is(
         assert np.array_equal(getattr(before, name), getattr(after, name)), name
 
 
+def test_all_of_the_boundary_of_what_is_filled_anew_is_held(
+    graph: BoundaryGraph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Corners of its rim, too: an edge between two of them was cut, and quads folded."""
+    filled, fill = [], meshing.fill_held
+
+    def held(part: BoundaryGraph, options: MeshingOptions) -> QuadMesh:
+        made = fill(part, options)
+        filled.append(part)
+        assert (part.point_kind == PointKind.HELD).all()
+        assert np.array_equal(made.points[: len(part.points)], part.points)
+        return made
+
+    monkeypatch.setattr(meshing, "fill_held", held)
+    meshed(graph, Tuning(worst=0.6))
+    assert filled
+
+
 def test_held_edges_are_not_halved(graph: BoundaryGraph) -> None:
     """Others mesh up to them."""
     kind = graph.point_kind.copy()
