@@ -25,9 +25,9 @@ from imgquad_core.measures.quality import quad_areas
 from imgquad_core.model import BoundaryGraph, PointKind, QuadMesh
 from imgquad_core.tracing import trace_mesh
 
-RINGS = 8  #: quads around a place that are filled anew
+RINGS = (8, 6, 11, 4)  #: quads around a place that are filled anew; other ones where that cannot be
 SEEDS, BAND = 5, 10  #: quads on each side of the rim: irregular nodes that are looked at, and what may change
-REACH = RINGS + BAND  #: quads around a place beyond which all stays
+REACH = RINGS[0] + BAND  #: quads around a place beyond which all stays
 PASSES = (CleanUp((40, 160), 1.0, 0.6, 160),)
 MARGIN = 4.0  #: px between what is filled anew and the border of its own small picture, and between two faces there
 
@@ -44,7 +44,9 @@ class _Cut(NamedTuple):
     moved: Floats  #: (n_faces, 2) by which each face has been
 
 
-def refilled(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill, threads: int) -> Area | None:
+def refilled(
+    area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill, threads: int, rings: int = RINGS[0]
+) -> Area | None:
     """Fill anew what lies near some quads, with edges of the boundary halved.
 
     Parameters
@@ -61,6 +63,8 @@ def refilled(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill, t
         Fills a boundary.
     threads : int
         The quads do not depend on it.
+    rings : int
+        Quads around these that are filled anew.
 
     Returns
     -------
@@ -68,7 +72,7 @@ def refilled(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill, t
         Its points begin with those of `area`, which stay, and the k mid-points in their order. None where the
         boundary cannot be filled.
     """
-    gone = _around(area, begin | _beside(area, ends), RINGS)
+    gone = _around(area, begin | _beside(area, ends), rings)
     cut = _cut_out(area, gone, ends, labels)
     try:
         mesh = fill(cut.graph)
@@ -82,6 +86,12 @@ def refilled(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill, t
     points = np.vstack([area.points, middle, (mesh.points - cut.moved[face])[rim:]])
     new = Area(points, ids[mesh.quads], cut.part[mesh.quad_region])
     return _cleaned_around(*replaced(area, gone, new), threads)
+
+
+def refilled_however(area: Area, begin: Flags, ends: Ints, labels: Labels, fill: Fill, threads: int) -> Area | None:
+    """Do what `refilled` does, with more quads or fewer where the boundary of these cannot be filled."""
+    made = (refilled(area, begin, ends, labels, fill, threads, rings) for rings in RINGS)
+    return next((found for found in made if found is not None), None)
 
 
 def replaced(area: Area, gone: Ints, new: Area) -> tuple[Area, Ints]:

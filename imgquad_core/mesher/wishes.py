@@ -22,7 +22,7 @@ from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.model import BoundaryGraph, PointKind, QuadMesh
 
 from .options import MeshingOptions
-from .refilling import REACH, Fill, refilled, within
+from .refilling import REACH, Fill, refilled, refilled_however, within
 from .strides import near_seams
 
 SMALL = 48  #: edges around a face all of which are halved where those that poor quads touch do not do
@@ -232,7 +232,8 @@ def _tried(mesh: QuadMesh, graph: BoundaryGraph, spots: list[Spot], fill: Fill, 
     places = np.sort(np.concatenate([spot.places for spot in spots]))
     ends = np.stack([graph.chain_points[places], graph.chain_points[places + 1]], axis=1)
     begin = np.isin(quads, np.concatenate([spot.poor for spot in spots]))
-    new = refilled(old, begin, np.searchsorted(used, ends), mesh.region_label[region], fill, threads)
+    how = refilled if len(spots) > 1 else refilled_however
+    new = how(old, begin, np.searchsorted(used, ends), mesh.region_label[region], fill, threads)
     if new is None:
         half = len(spots) // 2
         return [

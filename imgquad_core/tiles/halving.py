@@ -10,7 +10,7 @@ from imgquad_core.arrays import Floats, Ints
 from imgquad_core.cleanup.areas import Area
 from imgquad_core.cleanup.strips import nodes_around
 from imgquad_core.mesher import MeshingOptions, fill_held
-from imgquad_core.mesher.refilling import refilled
+from imgquad_core.mesher.refilling import refilled_however
 from imgquad_core.mesher.wishes import poor_quads
 
 from .meshes import TileMesh, bits_of, part_of
@@ -105,7 +105,7 @@ def with_edges_halved(mesh: TileMesh, edges: Edges, outlines: Outlines, options:
     labels = np.array([label[region] for region in regions.tolist()], np.int32)
     ends = nodes_at(mesh, np.concatenate([edges.tails, edges.heads])).reshape(2, -1).T
     area, nowhere = Area(mesh.points, mesh.quads, part.ravel()), np.zeros(len(mesh.quads), bool)
-    new = refilled(area, nowhere, ends, labels, lambda graph: fill_held(graph, options), options.n_threads)
+    new = refilled_however(area, nowhere, ends, labels, lambda graph: fill_held(graph, options), options.n_threads)
     if new is None:
         return None
     seam = np.append(mesh.seam, np.zeros(len(new.points) - len(mesh.points), bool))

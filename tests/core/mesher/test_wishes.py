@@ -93,7 +93,8 @@ def test_what_does_not_help_leaves_the_mesh_as_it_is(
     if wish == "fails":
         monkeypatch.setattr(meshing, "fill_held", failing)
     else:
-        monkeypatch.setattr(wishes, "refilled", worse)
+        for name in ("refilled", "refilled_however"):
+            monkeypatch.setattr(wishes, name, worse)
     after = meshed(graph, Tuning(worst=0.6))
     assert asked
     for name in ARRAYS:
