@@ -36,7 +36,7 @@ class Tuning(NamedTuple):
     """Numbers of the mesher that studies settled: handed down, so that a test or the next study can ask for others."""
 
     worst: float = 0.56  #: scaled Jacobian below which the boundary's edges at a quad are halved, if that helps
-    wishes: int = 8  #: rounds of halving for the sake of poor quads, at most
+    wishes: int = 16  #: rounds of halving for the sake of poor quads, at most
     rounds: int = 16  #: rounds of halving for the sake of folded ones, at most
     very_wide: float = 6.0  #: width of a face that is meshed on stride 6, in its coarse segments
     portions: Portions = PORTIONS  #: parts that threads share

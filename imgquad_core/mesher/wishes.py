@@ -12,6 +12,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags, Floats, Ints
 from imgquad_core.chains import chain_of_places, edges_of_chains, near_segments, with_mid_points
@@ -26,7 +27,7 @@ from .refilling import REACH, Fill, refilled, refilled_however, within
 from .strides import near_seams
 
 SMALL = 48  #: edges around a face all of which are halved where those that poor quads touch do not do
-FARTHEST = 3  #: segments before and after those that poor quads touch
+FARTHEST = 3  #: segments before and after those that poor quads touch; beyond that a place is given up
 WIDTH = 1.5  #: of quads, in mean ones: few within `REACH` quads are farther away; such are left as they are
 
 
@@ -52,15 +53,30 @@ def with_wishes(mesh: QuadMesh, shape: tuple[int, int], fill: Fill, options: Mes
     options : MeshingOptions
         Sizes, and what is poor.
     """
-    for attempt in range(options.tuning.wishes):
+    in_vain = np.empty(0, complex)  # where poor quads are, once for each time that filling anew did not help
+    for _ in range(options.tuning.wishes):
         graph = _graph_of(mesh, shape)
-        spots = _apart(_spots(mesh, graph, min(attempt - 1, FARTHEST), options.tuning.worst), mesh.n_quads)
-        tried = _tried(mesh, graph, spots, fill, options.n_threads) if spots else []
-        if any(found.better.any() for found in tried):
-            mesh = _with_better(mesh, graph, tried)
-        elif attempt > FARTHEST or not spots:
+        spots = _apart(_spots(mesh, graph, in_vain, options.tuning.worst), mesh.n_quads)
+        if not spots:
             break
+        tried = _tried(mesh, graph, spots, fill, options.n_threads)
+        better = {
+            spot.poor[0]
+            for found in tried
+            for spot, is_better in zip(found.spots, found.better, strict=True)
+            if is_better
+        }
+        poor = [spot.poor for spot in spots if spot.poor[0] not in better]
+        in_vain = np.concatenate([in_vain, *(_places_of(mesh, quads) for quads in poor)])
+        if better:
+            mesh = _with_better(mesh, graph, tried)
     return mesh
+
+
+def _places_of(mesh: QuadMesh, quads: Ints) -> NDArray[np.complex128]:
+    """Return where quads are, each as one value."""
+    places: NDArray[np.complex128] = mesh.points[mesh.quads[quads]].sum(axis=1).view(complex).ravel()
+    return places
 
 
 def _graph_of(mesh: QuadMesh, shape: tuple[int, int]) -> BoundaryGraph:
@@ -70,15 +86,19 @@ def _graph_of(mesh: QuadMesh, shape: tuple[int, int]) -> BoundaryGraph:
     return BoundaryGraph(mesh.points[:n], mesh.point_kind[:n], *mesh.chains, mesh.region_label, pixels, shape)
 
 
-def _spots(mesh: QuadMesh, graph: BoundaryGraph, reach: int, limit: float) -> Iterator[Spot]:
-    """Find the places with poor quads, the worst one first; no edges are halved where `reach` is negative."""
+def _spots(mesh: QuadMesh, graph: BoundaryGraph, in_vain: NDArray[np.complex128], limit: float) -> Iterator[Spot]:
+    """Find the places with poor quads, the worst one first.
+
+    At first no edges are halved there, then those that poor quads touch, then more, with each time that was in vain.
+    """
     is_seam = mesh.point_kind == PointKind.SEAM
     poor, worst = poor_quads(mesh.points, mesh.quads, mesh.quad_region, is_seam, limit)
+    reach = (_places_of(mesh, poor)[:, None] == in_vain).sum(axis=1) - 1
+    poor, worst, reach = (each[reach <= FARTHEST] for each in (poor, worst, reach))
     if not len(poor):
         return
     quad, node = _touched(mesh, graph, poor, reach)
-    near = near_segments(graph, node[node < len(graph.points)], reach) if reach >= 0 else np.zeros(1, bool)
-    places = np.flatnonzero(_may_be_halved(graph) & near)
+    places = np.flatnonzero(_may_be_halved(graph) & _near(graph, node, reach[quad]))
     run = np.cumsum(np.diff(places, prepend=-2) > 1) - 1  # an entry without an edge lies between two chains
     ends = np.append(graph.chain_points[places], graph.chain_points[places + 1])
     n_runs = int(run.max(initial=-1)) + 1
@@ -92,6 +112,14 @@ def _spots(mesh: QuadMesh, graph: BoundaryGraph, reach: int, limit: float) -> It
         if least[g] == 1.0:  # there is no such group, or no poor quad in it
             break
         yield _spot(mesh, graph, places[at[g]], poor[of[g]], cells)
+
+
+def _near(graph: BoundaryGraph, node: Ints, reach: Ints) -> Flags:
+    """Tell the entries of `chain_points` behind which is an edge within reach of nodes, each with its own."""
+    near, on_chains = np.zeros(len(graph.chain_points), bool), node < len(graph.points)
+    for r in np.unique(reach[reach >= 0]).tolist():
+        near |= near_segments(graph, node[on_chains & (reach == r)], r)
+    return near
 
 
 def _rows(group: Ints, n: int) -> list[Ints]:
@@ -115,13 +143,13 @@ def poor_quads(points: Floats, quads: Ints, region: Ints, is_seam: Flags, limit:
     return poor, sj[poor]
 
 
-def _touched(mesh: QuadMesh, graph: BoundaryGraph, poor: Ints, reach: int) -> tuple[Ints, Ints]:
+def _touched(mesh: QuadMesh, graph: BoundaryGraph, poor: Ints, reach: Ints) -> tuple[Ints, Ints]:
     """Return pairs of a poor quad, by its place among them, and a node: its own, and one of the boundary at least.
 
     Where more than what it touches is to be halved, all of a small face's boundary is.
     """
     corners, region = mesh.quads[poor], mesh.quad_region[poor]
-    is_small = _edges_around(graph)[region] <= (SMALL if reach > 0 else 0)
+    is_small = (_edges_around(graph)[region] <= SMALL) & (reach > 0)
     is_alone = (corners >= len(graph.points)).all(axis=1)
     quads, nodes = [np.repeat(np.arange(len(poor)), 4)], [corners.ravel()]
     for k in np.flatnonzero(is_small | is_alone):
