@@ -37,11 +37,11 @@ def with_musts(state: State, options: MeshingOptions) -> State:
         Quads stay folded.
     """
     for attempt in range(options.tuning.rounds):
-        folded = poor_rim(state, 0.0)
+        folded = folded_rim(state)
         if len(folded) == 0:
             break
         state = _refitted(state, _finer(state.graph, folded, attempt, options.tuning), options)
-    if (folded := poor_rim(state, 0.0)).size:
+    if (folded := folded_rim(state)).size:
         where = state.graph.points[folded[0]].tolist()
         raise TopologyError(f"{len(folded)} boundary points fold quads, the first at {where}")
     return state
@@ -74,26 +74,26 @@ def _groups_across(graph: BoundaryGraph, chains: Flags) -> Ints:
     return linked(a, b, n)[0]
 
 
-def _finer(graph: BoundaryGraph, poor: Ints, attempt: int, tuning: Tuning) -> BoundaryGraph:
-    """Return the graph with halved edges beside points with poor quads.
+def _finer(graph: BoundaryGraph, folded: Ints, attempt: int, tuning: Tuning) -> BoundaryGraph:
+    """Return the graph with halved edges beside points with folded quads.
 
     A halved edge is straight, so no point there can fold a quad. The reach grows, and in the end all edges are halved:
     that settles it whatever the picture.
     """
     if attempt == tuning.rounds - 1:
         return halved(graph, np.ones(graph.n_chains, bool))
-    return refined(graph, poor, 2 ** max(attempt - PATIENCE, 0) - 1)
+    return refined(graph, folded, 2 ** max(attempt - PATIENCE, 0) - 1)
 
 
-def poor_rim(state: State, limit: float) -> Ints:
-    """Return the boundary points of quads not above `limit`, and all those of a face whose such quads have none."""
+def folded_rim(state: State) -> Ints:
+    """Return the boundary points of folded quads, and all those of a face whose folded quads have none."""
     found, meshed = [np.empty(0, np.int64)], state.meshed
-    for whole in meshed.parts if (meshed.worst <= limit).any() else ():
+    for whole in meshed.parts if (meshed.worst <= 0.0).any() else ():
         part = judged(whole, state.graph)
-        looked_at = np.flatnonzero(meshed.worst[part.face] <= limit)
-        poor = looked_at[scaled_jacobian(part.points, part.quads[looked_at]) <= limit]
-        origin = part.origin[part.quads[poor]]
-        inner = np.setdiff1d(part.face[poor], part.face[poor[(origin >= 0).any(axis=1)]])
+        looked_at = np.flatnonzero(meshed.worst[part.face] <= 0.0)
+        folded = looked_at[scaled_jacobian(part.points, part.quads[looked_at]) <= 0.0]
+        origin = part.origin[part.quads[folded]]
+        inner = np.setdiff1d(part.face[folded], part.face[folded[(origin >= 0).any(axis=1)]])
         found += [origin.ravel(), part.origin[part.quads[np.isin(part.face, inner)]].ravel()]
     points = np.unique(np.concatenate(found))
     return np.asarray(points[points >= 0])

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imgquad_core.arrays import Flags, Floats, Ints
-from imgquad_core.chains import chain_of_places, edges_of_chains, near_segments, with_mid_points
+from imgquad_core.chains import edges_of_chains, near_segments, with_mid_points
 from imgquad_core.cleanup.areas import Area
 from imgquad_core.geometry.quad_shape import lower_to_worst
-from imgquad_core.grouping import linked
+from imgquad_core.grouping import grouped, linked
 from imgquad_core.measures.quality import scaled_jacobian
 from imgquad_core.model import BoundaryGraph, PointKind, QuadMesh
 
@@ -93,8 +93,9 @@ def _spots(mesh: QuadMesh, graph: BoundaryGraph, in_vain: NDArray[np.complex128]
     """
     is_seam = mesh.point_kind == PointKind.SEAM
     poor, worst = poor_quads(mesh.points, mesh.quads, mesh.quad_region, is_seam, limit)
-    reach = (_places_of(mesh, poor)[:, None] == in_vain).sum(axis=1) - 1
-    poor, worst, reach = (each[reach <= FARTHEST] for each in (poor, worst, reach))
+    reach = _times(_places_of(mesh, poor), in_vain) - 1
+    left = reach <= FARTHEST
+    poor, worst, reach = poor[left], worst[left], reach[left]
     if not len(poor):
         return
     quad, node = _touched(mesh, graph, poor, reach)
@@ -112,6 +113,12 @@ def _spots(mesh: QuadMesh, graph: BoundaryGraph, in_vain: NDArray[np.complex128]
         if least[g] == 1.0:  # there is no such group, or no poor quad in it
             break
         yield _spot(mesh, graph, places[at[g]], poor[of[g]], cells)
+
+
+def _times(values: NDArray[np.complex128], among: NDArray[np.complex128]) -> Ints:
+    """Return how often each value is among others."""
+    ordered = np.sort(among)
+    return np.asarray(np.searchsorted(ordered, values, "right") - np.searchsorted(ordered, values))
 
 
 def _near(graph: BoundaryGraph, node: Ints, reach: Ints) -> Flags:
@@ -152,9 +159,10 @@ def _touched(mesh: QuadMesh, graph: BoundaryGraph, poor: Ints, reach: Ints) -> t
     is_small = (_edges_around(graph)[region] <= SMALL) & (reach > 0)
     is_alone = (corners >= len(graph.points)).all(axis=1)
     quads, nodes = [np.repeat(np.arange(len(poor)), 4)], [corners.ravel()]
+    begin, sides = grouped(graph.chain_regions + 1, len(graph.region_label) + 1)  # VOID is the first one
     for k in np.flatnonzero(is_small | is_alone):
-        beside = (graph.chain_regions == region[k]).any(axis=1)
-        rim = np.unique(graph.chain_points[beside[chain_of_places(graph)]])
+        beside = sides[begin[region[k] + 1] : begin[region[k] + 2]] // 2
+        rim = np.unique(np.concatenate([graph.chain(c) for c in beside]))
         more = rim if is_small[k] else _nearest(graph, rim, mesh.points[corners[k]].mean(axis=0))
         quads.append(np.full(len(more), k))
         nodes.append(more)

@@ -64,8 +64,8 @@ def _kept(job: Job, t: int, attempt: int) -> dict[str, Any] | None:
 def _mended(job: Job, t: int, before: dict[str, Any], outlines: Outlines, halved: EdgesOf) -> Made | None:
     """Return the mesh that was made before, with edges halved; None where that does not do."""
     mesh = TileMesh(**load_arrays(job.path("mesh", t, int(before["made"]))))
-    mesh_with = with_edges_halved(mesh, edges_of(outlines, halved), outlines, _options(job))
-    return Made(mesh_with, before["stride"], before["fell"]) if mesh_with else None
+    mended = with_edges_halved(mesh, edges_of(outlines, halved), outlines, _options(job))
+    return Made(mended, before["stride"], before["fell"]) if mended else None
 
 
 def _made_anew(job: Job, mine: Outlines, found: Outlines, attempt: int) -> Made | None:
@@ -132,8 +132,6 @@ def _is_on_its_strides(job: Job, wish: dict[str, Any]) -> bool:
 
 def _widest(job: Job, region: Ints) -> Ints:
     """Return the stride that faces of some regions are meshed on at most, once that is known."""
-    path, found = job.path("strides"), np.full(len(region), WIDEST)
-    known = load_arrays(path)
+    known = load_arrays(job.path("strides"))
     limits = dict(zip(known["region"].tolist(), known["widest"].tolist(), strict=True))
-    found[:] = [limits.get(number, WIDEST) for number in region.tolist()]
-    return found
+    return np.array([limits.get(number, WIDEST) for number in region.tolist()], np.int64)

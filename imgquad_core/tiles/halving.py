@@ -103,7 +103,7 @@ def with_edges_halved(mesh: TileMesh, edges: Edges, outlines: Outlines, options:
     regions, part = np.unique(mesh.region, return_inverse=True)
     label = dict(zip(outlines.region.tolist(), outlines.label.tolist(), strict=True))
     labels = np.array([label[region] for region in regions.tolist()], np.int32)
-    ends = nodes_at(mesh, np.concatenate([edges.tails, edges.heads])).reshape(2, -1).T
+    ends = _nodes_at(mesh, np.concatenate([edges.tails, edges.heads])).reshape(2, -1).T
     area, nowhere = Area(mesh.points, mesh.quads, part.ravel()), np.zeros(len(mesh.quads), bool)
     new = refilled_however(area, nowhere, ends, labels, lambda graph: fill_held(graph, options), options.n_threads)
     if new is None:
@@ -112,7 +112,7 @@ def with_edges_halved(mesh: TileMesh, edges: Edges, outlines: Outlines, options:
     return part_of(TileMesh(new.points, new.quads, regions[new.part], seam), np.ones(len(new.quads), bool))
 
 
-def nodes_at(mesh: TileMesh, places: Floats) -> Ints:
+def _nodes_at(mesh: TileMesh, places: Floats) -> Ints:
     """Return the node at each place; there must be one."""
     nodes = np.flatnonzero(np.isin(mesh.points[:, 0], places[:, 0]))
     bits, first = np.unique(bits_of(mesh.points[nodes]), return_index=True)

@@ -13,7 +13,7 @@ from imgquad_core.cleanup.faces import faces_only
 from imgquad_core.cleanup.options import Portions
 from imgquad_core.errors import InputError, TopologyError
 from imgquad_core.measures.quality import quality_report
-from imgquad_core.mesher import refits, strides
+from imgquad_core.mesher import strides
 from imgquad_core.mesher.efforts import EFFORTS, Tuning
 from imgquad_core.mesher.meshing import mesh_boundaries
 from imgquad_core.mesher.options import MeshingOptions
@@ -77,17 +77,6 @@ def test_boundary_points_are_met_however_the_boundary_bends(size: float) -> None
     mesh = mesh_boundaries(graph, MeshingOptions(size=size, effort="fast"))
     assert mesh.points[: len(graph.points)].tobytes() == graph.points.tobytes()
     assert naive.worst_quality(mesh.points, mesh.quads) > 0.5
-
-
-def test_edges_are_halved_beside_points_that_fold_quads() -> None:
-    image = label_image(np.random.default_rng(5).integers(0, 3, (40, 40)))
-    graph = boundaries(image, 5.0)
-    usual = Tuning()
-    halved = [refits._finer(graph, np.array([9]), k, usual) for k in range(usual.rounds)]
-    more = [len(finer.points) - len(graph.points) for finer in halved]
-    assert more == sorted(more)
-    assert more[0] in (2, 4, 8, 12)  # the segments around one point
-    assert more[-1] == (np.diff(graph.chain_offsets) - 1).sum()
 
 
 def test_every_face_has_quads_however_bad_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
