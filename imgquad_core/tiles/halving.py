@@ -9,6 +9,7 @@ import numpy as np
 from imgquad_core.arrays import Floats, Ints
 from imgquad_core.cleanup.areas import Area
 from imgquad_core.cleanup.strips import nodes_around
+from imgquad_core.errors import TopologyError
 from imgquad_core.mesher import MeshingOptions, fill_held
 from imgquad_core.mesher.refilling import refilled_however
 from imgquad_core.mesher.wishes import poor_quads
@@ -113,8 +114,17 @@ def with_edges_halved(mesh: TileMesh, edges: Edges, outlines: Outlines, options:
 
 
 def _nodes_at(mesh: TileMesh, places: Floats) -> Ints:
-    """Return the node at each place; there must be one."""
+    """Return the node at each place.
+
+    Raises
+    ------
+    TopologyError
+        There is none: two tiles would not fit.
+    """
     nodes = np.flatnonzero(np.isin(mesh.points[:, 0], places[:, 0]))
     bits, first = np.unique(bits_of(mesh.points[nodes]), return_index=True)
-    found: Ints = nodes[first[np.searchsorted(bits, bits_of(places))]]
+    wanted = bits_of(places)
+    if (lost := np.flatnonzero(~np.isin(wanted, bits))).size:
+        raise TopologyError(f"the mesh of a tile lacks an end of a shared edge, {places[lost[0]].tolist()}")
+    found: Ints = nodes[first[np.searchsorted(bits, wanted)]]
     return found

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from imgquad_core.boundary import SmoothingOptions
+from imgquad_core.errors import TopologyError
 from imgquad_core.geometry.halfedge import twins_of
 from imgquad_core.measures.quality import quad_areas, scaled_jacobian
 from imgquad_core.mesher import MeshingOptions
@@ -99,6 +100,14 @@ def test_an_odd_number_of_edges_cannot_be_filled(both: list[Outlines], meshes: l
     c = chain_of_disc(both[0])
     one = edges_of(both[0], {tuple(both[0].key[c].tolist()): {3}})
     assert with_edges_halved(meshes[0], one, both[0], HOW) is None
+
+
+def test_an_edge_that_the_mesh_lacks_is_an_error(both: list[Outlines], meshes: list[TileMesh]) -> None:
+    """Else the tiles would not fit, without a word."""
+    edges = edges_of(both[0], some_edges(both[0]))
+    edges.heads[1] += 0.25
+    with pytest.raises(TopologyError, match="lacks an end of a shared edge"):
+        with_edges_halved(meshes[0], edges, both[0], HOW)
 
 
 def test_segments_are_wished_that_poor_quads_touch(both: list[Outlines], meshes: list[TileMesh]) -> None:
